@@ -400,7 +400,8 @@ pub struct WorkerArgs {
     /// Use only these processors, as in 0,2-3
     #[arg(long, value_name = "LIST")]
     pub pin: Option<Processors>,
-    /// Compute threads [default: the cores that it may use]
+    /// Compute threads, which small jobs share [default: the cores that it may
+    /// use]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
     /// Memory that its share of a job may take (GB); a job whose share would take more waits for other workers [default: what is available

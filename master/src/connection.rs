@@ -323,6 +323,7 @@ impl Acceptor {
                     spec: WorkerSpec { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
                     address: address.clone(),
                     memory: hello.memory,
+                    divides: hello.divides,
                     certificate,
                     peer: peer_address(&address, hello.peer_port),
                     incarnation,
@@ -348,7 +349,7 @@ impl Acceptor {
             let _ = send.send(Input::Lost(index, why)).await;
         }
         let _ = self.notices.send(Notice::Left { incarnation, why: words, end }).await;
-        Err(error)
+        if delivery.is_to_end() { Ok(()) } else { Err(error) }
     }
 
     /// Hands a worker's messages to its job, and says when it has been silent; ends with the link, or when the job will

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use protocol::{handshake::Hello, request::HostRow};
 
-use crate::notice::End;
+use crate::{event::WorkerSpec, notice::End};
 
 /// Most hosts that are gone and remembered.
 pub const LOST_LIMIT: usize = 1000;
@@ -165,6 +165,18 @@ impl Hosts {
     /// Those that are connected, by number.
     pub fn connected(&self) -> impl Iterator<Item = &Host> {
         self.by_number.values().filter(|host| !host.state.is_gone())
+    }
+
+    /// A connection goes on with the threads and the speed of this.
+    pub fn compute_with(&mut self, incarnation: u32, spec: &WorkerSpec) {
+        if let Some(host) = self.by_number.values_mut().find(|host| host.incarnation == incarnation) {
+            (host.threads, host.speed) = (spec.threads, spec.speed);
+        }
+    }
+
+    /// Another connection of its process has its threads: nobody asks for it any more.
+    pub fn forget(&mut self, incarnation: u32) {
+        self.by_number.retain(|_, host| host.incarnation != incarnation);
     }
 
     /// These connections compute a job from now on.

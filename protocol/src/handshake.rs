@@ -26,7 +26,8 @@ use std::fmt;
 /// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans;
 /// beams in assignments.
 /// 11: the most workers that a job takes, and the seconds to its end; plies of shells in assignments.
-pub const VERSION: u16 = 12;
+/// 13: workers that divide their threads.
+pub const VERSION: u16 = 13;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;
@@ -119,6 +120,8 @@ pub struct Hello {
     pub proof: Option<String>,
     /// Of a worker: memory that its process may take (bytes), 0 where its system does not say. 0 for other roles.
     pub memory: u64,
+    /// Of a worker: whether it can give some of its threads to another connection. False for other roles.
+    pub divides: bool,
 }
 
 impl Hello {
@@ -145,6 +148,7 @@ impl Hello {
             member: None,
             proof: None,
             memory: 0,
+            divides: false,
         }
     }
 

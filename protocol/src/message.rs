@@ -72,6 +72,13 @@ pub enum ToWorker {
     Release,
     /// Before `Assign` on route direct: where the other workers of this job and epoch are found.
     Peers(Box<Introduction>),
+    /// At any time, to a worker that [divides](crate::handshake::Hello::divides): how many threads it computes with from now on; with none, which
+    /// only an idle one is told, its connection ends. Not answered.
+    Threads {
+        computes: u32,
+        /// Those of its threads that are given to another connection, which its process opens; 0 for none.
+        apart: u32,
+    },
 }
 
 /// Who computes a job, for links between its workers. Its frame names the job and the epoch.

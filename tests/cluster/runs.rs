@@ -137,6 +137,52 @@ fn jobs_share_workers_and_have_the_bits_that_they_have_alone() {
     assert_eq!(summary["losses"].as_array().map(Vec::len), Some(0), "nobody was lost: {summary}");
 }
 
+/// Three jobs that use two threads each share the six of one host: the first has all of them until the others come, and has them back when
+/// they are over.
+#[test]
+fn small_jobs_share_a_host_by_its_threads_and_have_the_bits_that_they_have_alone() {
+    let mut cluster = Cluster::start(BOLIDE, true);
+    cluster.worker_with("a", "6", &["--threads", "6"]);
+    let deck = small();
+    let submit = |cycles| cluster.json(&["submit", &deck, "--cycles", cycles, "--no-output"])["job"].clone();
+    let slots = || -> Vec<(String, u64, String)> {
+        let row = |host: &serde_json::Value| {
+            let words = |key: &str| host[key].as_str().unwrap_or_default().to_owned();
+            (words("name"), host["threads"].as_u64().unwrap_or_default(), words("note"))
+        };
+        cluster.json(&["hosts"]).as_array().expect("rows").iter().map(row).collect()
+    };
+    let are = |expected: &[(&str, u64, &str)]| {
+        let what = || format!("slots {expected:?}, found {:?}: {}", slots(), cluster.master.text());
+        until(what, || {
+            let slots = slots();
+            let found = slots.iter().map(|(name, threads, note)| (name.as_str(), *threads, note.as_str()));
+            found.eq(expected.iter().copied()).then_some(())
+        });
+    };
+    assert_eq!(submit(LONG), 1);
+    are(&[("a", 6, "job 1")]);
+    assert_eq!(submit(LONG), 2);
+    are(&[("a", 2, "job 1"), ("a@2", 4, "job 2")]);
+    assert_eq!(submit("40"), 3);
+    let summary = cluster.json(&["watch", "3"]);
+    assert_eq!((digest_of(&summary), &summary["workers"]), (reference().to_owned(), &1.into()));
+    assert!(cluster.master.text().contains("worker a@3 joined"), "{}", cluster.master.text());
+    let threads = || slots().iter().map(|slot| slot.1).collect::<Vec<_>>();
+    let are_back = || threads() == [4, 2] || threads() == [2, 4];
+    until(|| format!("six threads in two slots: {:?}", slots()), || are_back().then_some(()));
+    for job in ["1", "2"] {
+        let summary = cluster.json(&["watch", job]);
+        assert_eq!(digest_of(&summary), long_reference());
+        assert_eq!(summary["losses"].as_array().map(Vec::len), Some(0), "nobody was lost: {summary}");
+    }
+    until(
+        || format!("one idle slot: {:?}", slots()),
+        || (threads() == [6] && slots()[0].2.is_empty()).then_some(()),
+    );
+    assert!(!cluster.master.text().contains("WARN"), "{}", cluster.master.text());
+}
+
 /// A job that wants both workers is next; a shorter one passes it, and is stored for it when the job before it ends too soon.
 #[test]
 fn a_job_that_passed_a_reservation_is_stored_for_it_and_goes_on_behind_it() {

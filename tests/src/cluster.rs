@@ -328,7 +328,10 @@ impl Cluster {
     /// # Panics
     /// If it does not join.
     pub fn worker_as(&mut self, host: &str, name: &str, speed: &str, flags: &[&str]) {
-        let mut arguments = vec!["worker", "--name", name, "--speed", speed, "--threads", "1"];
+        let mut arguments = vec!["worker", "--name", name, "--speed", speed];
+        if !flags.contains(&"--threads") {
+            arguments.extend(["--threads", "1"]);
+        }
         arguments.extend(flags);
         self.certify(host);
         let mut command = self.command(host, &arguments);

@@ -24,7 +24,10 @@ use protocol::{
 };
 use rayon::ThreadPool;
 use system::interrupts::Interrupts;
-use tokio::sync::{mpsc, oneshot, watch};
+use tokio::{
+    sync::{mpsc, oneshot, watch},
+    task::JoinSet,
+};
 use tracing::{info, warn};
 
 use crate::{
@@ -33,6 +36,7 @@ use crate::{
     owner::{self, Rules, Share},
     peers::{Peers, links::Links},
     runner::{Compute, Runner},
+    slots::{self, Slot},
 };
 
 /// Messages that may wait for the compute thread: a master sends at most a few ahead, a neighbour two.
@@ -104,6 +108,8 @@ pub struct Service {
     pub compute: Compute,
     /// The part of its time that it may.
     pub share: Share,
+    /// How many threads the pool has, and what gives some of them away.
+    pub slot: Slot,
 }
 
 /// What a worker is told to do beside what its master says.
@@ -130,30 +136,74 @@ async fn is_told<T: Clone>(said: &mut watch::Receiver<Option<T>>) -> T {
 /// Why it cannot go on, as a sentence.
 pub fn run(options: &Options) -> std::result::Result<(), String> {
     let certificates = dial::certificates(options.certs.as_deref()).map_err(|e| e.to_string())?;
-    let pool = compute_pool(options.threads as usize)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .thread_name("link")
         .build()
         .map_err(|e| format!("threads of the link: {e}"))?;
-    let hello = greeting(options);
     let result = runtime.block_on(async {
         let (told, end) = watch::channel(None);
         let share = Share::default();
         let away = owner::watch(&options.rules, &share);
-        let service = Service { pool, peers: None, compute: options.compute, share };
         tokio::spawn(notify::live());
         // A master that is away is no fault of this service.
         notify::say(&format!("READY=1\nSTATUS=dialling {}", options.master));
+        let process = Process {
+            options: options.clone(),
+            certificates,
+            hello: greeting(options),
+            share,
+            told: Told { end, away },
+        };
         tokio::select! {
-            result = stay(options, certificates.as_ref(), &hello, service, Told { end, away }) => result,
+            result = serve_in_slots(process) => result,
             () = leave_by_and_by(&told) => Ok(()),
         }
     });
     // A task under way need not be waited for.
     runtime.shutdown_background();
     result
+}
+
+/// What the slots of a process have in common.
+#[derive(Clone)]
+struct Process {
+    options: Options,
+    certificates: Option<Arc<ClientConfig>>,
+    /// What the whole of it says of itself.
+    hello: Hello,
+    share: Share,
+    told: Told,
+}
+
+/// Serves with all threads, and in more slots where the master has some given away; ends with the last of them.
+async fn serve_in_slots(process: Process) -> std::result::Result<(), String> {
+    let (open, mut asked) = mpsc::unbounded_channel();
+    let open = process.hello.divides.then_some(open);
+    let all = process.options.threads;
+    let mut serving = JoinSet::new();
+    serving.spawn(stay(process.clone(), process.hello.clone(), Slot::new(all, all, open.clone())));
+    let mut slots = 1;
+    loop {
+        tokio::select! {
+            Some(threads) = asked.recv() => {
+                slots += 1;
+                let hello = Hello { name: slots::name_of(&process.options.name, slots), ..process.hello.clone() };
+                info!(threads, "slot {} opens", hello.name);
+                serving.spawn(stay(process.clone(), hello, Slot::new(threads, all, open.clone())));
+            }
+            Some(ended) = serving.join_next() => {
+                let result = ended.unwrap_or_else(|bug| Err(format!("a slot: {bug}")));
+                if serving.is_empty() {
+                    return result;
+                }
+                if let Err(why) = result {
+                    warn!("a slot of this worker ends: {why}");
+                }
+            }
+        }
+    }
 }
 
 /// The pool that a worker computes on.
@@ -182,6 +232,9 @@ fn greeting(options: &Options) -> Hello {
     hello.token.clone_from(&options.token);
     hello.proof = Some(mechanics::proof::of_this_machine());
     hello.memory = options.memory.or_else(system::memory::available).unwrap_or_default();
+    // Each slot has ports of its own: the one that other workers call, and the one that is emulated.
+    let peers = matches!(options.peers, Listen::Nowhere | Listen::Port { port: 0, announce: None });
+    hello.divides = options.threads > 1 && peers && options.port.is_none();
     hello
 }
 
@@ -200,15 +253,11 @@ async fn leave_by_and_by(told: &watch::Sender<Option<()>>) {
     }
 }
 
-/// Dials, serves, dials again.
-async fn stay(
-    options: &Options,
-    certificates: Option<&Arc<ClientConfig>>,
-    hello: &Hello,
-    mut service: Service,
-    mut told: Told,
-) -> std::result::Result<(), String> {
-    let mut hello = hello.clone();
+/// Dials, serves, dials again, in one slot.
+async fn stay(process: Process, mut hello: Hello, slot: Slot) -> std::result::Result<(), String> {
+    let Process { options, certificates, hello: whole, share, mut told } = process;
+    let pool = compute_pool(slot.threads() as usize)?;
+    let mut service = Service { pool, peers: None, compute: options.compute, share, slot };
     let mut listening = None;
     let mut alone_since = Instant::now();
     let mut pause = FIRST_PAUSE;
@@ -222,7 +271,12 @@ async fn stay(
             }
             (alone_since, pause) = (Instant::now(), FIRST_PAUSE);
         }
-        let error = match join(options, certificates, &mut hello, &mut listening, &mut service).await {
+        service.slot.offer(&whole, &mut hello);
+        if service.pool.current_num_threads() != hello.threads as usize {
+            service.pool = compute_pool(hello.threads as usize)?;
+        }
+        let joined = join(&options, certificates.as_ref(), &mut hello, &mut listening, &mut service).await;
+        let error = match joined {
             Ok(call) => {
                 info!(
                     host = call.welcome.host,
@@ -233,7 +287,8 @@ async fn stay(
                 notify::say(&format!("STATUS=joined {} as host {}", options.master, call.welcome.host));
                 let error = serve_until(call, service.clone(), told.clone()).await;
                 let is_away = told.away.borrow().is_some();
-                if told.end.borrow().is_some() || (options.once && !is_away) {
+                let is_over = told.end.borrow().is_some() || service.slot.threads() == 0;
+                if is_over || (options.once && !is_away) {
                     return Ok(());
                 }
                 (alone_since, pause) = (Instant::now(), FIRST_PAUSE);
@@ -318,15 +373,19 @@ pub async fn serve(call: Call, service: Service) -> Error {
 }
 
 /// [`serve`] until this process is told to leave and the master has released it.
-async fn serve_until(call: Call, Service { pool, peers, compute, share }: Service, mut told: Told) -> Error {
+async fn serve_until(
+    call: Call,
+    Service { pool, peers, compute, share, slot }: Service,
+    mut told: Told,
+) -> Error {
     let Call { sender, mut receiver, welcome } = call;
     let (send, messages) = mpsc::channel(WAITING_MESSAGES);
     let (fail, mut failed) = oneshot::channel();
     let outbox = Outbox::new(sender.clone(), welcome.incarnation);
     let links = Links::new(peers.as_deref(), send.downgrade());
     let computing = std::thread::Builder::new().name("session".to_owned()).spawn(move || {
-        let runner = Runner::new(compute, share, outbox, links);
-        if let Err(error) = pool.install(|| runner.run(messages)) {
+        let runner = Runner::new(compute, share, slot, outbox, links);
+        if let Err(error) = compute_in(pool, runner, messages) {
             // The receiver is gone when the connection has ended already.
             let _ = fail.send(error);
         }
@@ -368,6 +427,18 @@ async fn serve_until(call: Call, Service { pool, peers, compute, share }: Servic
         let _ = tokio::task::spawn_blocking(move || thread.join()).await;
     }
     error
+}
+
+/// Runs on `pool`, and on others as the slot's threads change.
+fn compute_in(
+    mut pool: Arc<ThreadPool>,
+    mut runner: Runner,
+    mut messages: mpsc::Receiver<Input>,
+) -> Result<()> {
+    while let Some(threads) = pool.install(|| runner.run(&mut messages))? {
+        pool = compute_pool(threads as usize).map_err(Error::Message)?;
+    }
+    Ok(())
 }
 
 /// Hands every message on, in order; ends with the link.

@@ -4,7 +4,7 @@
 //! carries bytes between a master and the compute thread of [`runner`]; [`peers`] between that and other workers.
 //! [`stopwatch`] tells where the time goes, [`notify`] a service manager how this process does;
 //! [`owner`] steps back where the people whose PC it is on need it;
-//! [`processors`] confines it to some of this machine's.
+//! [`processors`] confines it to some of this machine's; in [`slots`] several small jobs share its threads.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 
@@ -17,6 +17,7 @@ pub mod peers;
 pub mod processors;
 pub mod runner;
 pub mod session;
+pub mod slots;
 pub mod stopwatch;
 
 /// A number that no other process draws: for nonces and tokens.

@@ -25,6 +25,7 @@ use crate::{
     owner::Share,
     peers::links::{Links, Step},
     session::{Action, Event, Outcome, Session, Task},
+    slots::Slot,
     stopwatch::{Lap, Stopwatch},
 };
 
@@ -53,11 +54,15 @@ pub struct Runner {
     leaving: Option<String>,
     /// The part of its time that it may work.
     share: Share,
+    /// Its threads.
+    slot: Slot,
+    /// Set once it is to compute with another number of threads.
+    threads: Option<u32>,
 }
 
 impl Runner {
     /// Without a job.
-    pub fn new(compute: Compute, share: Share, outbox: Outbox, links: Links) -> Self {
+    pub fn new(compute: Compute, share: Share, slot: Slot, outbox: Outbox, links: Links) -> Self {
         Self {
             compute,
             outbox,
@@ -71,14 +76,16 @@ impl Runner {
             reported: Instant::now(),
             leaving: None,
             share,
+            slot,
+            threads: None,
         }
     }
 
-    /// Takes one input after another until there can be no more.
+    /// Takes one input after another until there can be no more, or until it is to go on with so many threads.
     ///
     /// # Errors
     /// Why the connection to the master must end: [`Error::Left`] if it was asked to leave and holds nothing any more.
-    pub fn run(mut self, mut inputs: mpsc::Receiver<Input>) -> Result<()> {
+    pub fn run(&mut self, inputs: &mut mpsc::Receiver<Input>) -> Result<Option<u32>> {
         while let Some(input) = inputs.blocking_recv() {
             match input {
                 Input::Master(header, message) => self.master(&header, message)?,
@@ -101,8 +108,11 @@ impl Runner {
             {
                 self.send(&ready)?;
             }
+            if let Some(threads) = self.threads.take() {
+                return Ok(Some(threads));
+            }
         }
-        Ok(())
+        Ok(None)
     }
 
     fn master(&mut self, header: &Header, message: ToWorker) -> Result<()> {
@@ -110,6 +120,9 @@ impl Runner {
         if let ToWorker::Peers(introduction) = message {
             self.links.introduce(key, *introduction);
             return Ok(());
+        }
+        if let ToWorker::Threads { computes, apart } = message {
+            return self.divide(computes, apart);
         }
         let job_before = self.watch.place.job;
         self.watch.heard(header, &message)?;
@@ -146,6 +159,19 @@ impl Runner {
             }
             message => self.apply(Event::Message(message)),
         }
+    }
+
+    /// Goes on with other threads; ends where another slot has them all.
+    fn divide(&mut self, computes: u32, apart: u32) -> Result<()> {
+        if computes == 0 && !self.session.is_idle() {
+            return Err(Error::Message("asked to give all threads back in the middle of a job".to_owned()));
+        }
+        self.slot.divide(computes, apart)?;
+        if computes == 0 {
+            return Err(Error::Left { reason: "another slot of its process has its threads".to_owned() });
+        }
+        self.threads = Some(computes);
+        Ok(())
     }
 
     fn step(&mut self, Step { heard, relay }: Step) -> Result<()> {

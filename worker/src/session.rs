@@ -263,8 +263,8 @@ impl Session {
             }
             _ if self.phase == Phase::Over || self.phase == Phase::Idle => Ok(()),
             ToWorker::Relayed { from, message } => self.hear_peer(from, message, actions),
-            // Links are the runtime's affair.
-            ToWorker::Peers(_) => Ok(()),
+            // Links and threads are the runtime's affair.
+            ToWorker::Peers(_) | ToWorker::Threads { .. } => Ok(()),
             ToWorker::Start { orders } => {
                 for order in orders {
                     self.orders.insert(order.next, order);

@@ -26,6 +26,8 @@ pub struct WorkerLink {
     pub address: String,
     /// Memory that its process may take (bytes), as it said when it called; 0 if it does not say.
     pub memory: u64,
+    /// Whether it can give threads to another slot of its process.
+    pub divides: bool,
     /// The certificate that it showed, in words.
     pub certificate: Option<String>,
     /// Where it takes other workers, if it does.
@@ -42,6 +44,13 @@ impl WorkerLink {
     /// What it can take of a job.
     pub(crate) fn bearer(&self) -> Bearer<'_> {
         Bearer { name: &self.spec.name, speed: self.spec.speed, memory: self.memory }
+    }
+
+    /// It has so many threads from now on, and speed and memory in proportion.
+    pub(crate) fn compute_with(&mut self, threads: u32) {
+        let part = f64::from(threads) / f64::from(self.spec.threads.max(1));
+        self.memory = (self.memory as f64 * part) as u64;
+        self.spec = WorkerSpec { threads, speed: self.spec.speed * part, ..self.spec.clone() };
     }
 
     /// Queues a message to it.
@@ -110,6 +119,8 @@ struct Port {
     gone: Option<String>,
     /// Why the job will have no more to do with the worker.
     dismissal: Option<String>,
+    /// The connection is about to end, as it was asked to.
+    is_to_end: bool,
 }
 
 impl Delivery {
@@ -128,6 +139,16 @@ impl Delivery {
     /// Waits until the worker is dismissed. Cancel safe.
     pub async fn dismissed(&self) {
         self.dismissed.notified().await;
+    }
+
+    /// The worker was asked to end the connection: its end is no fault.
+    pub(crate) fn expect_end(&self) {
+        self.port().is_to_end = true;
+    }
+
+    /// Whether it was.
+    pub(crate) fn is_to_end(&self) -> bool {
+        self.port().is_to_end
     }
 
     /// Why the worker was dismissed, if it was.

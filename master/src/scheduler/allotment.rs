@@ -12,20 +12,27 @@
 //!   them are stored and wait behind it.
 //! - What is idle after that is given to those that have least of their part, as far as it helps them at all ([`HELPS`]).
 //! - Work is dealt out anew where workers change, so a job whose end is near keeps those that it has.
+//! - A job on one worker of which it uses half of the threads at most leaves the others to a job that lacks a worker; idle threads go back to
+//!   the job on the same host, if they make it faster and nobody waits ([`slots`]).
 
-use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
+use std::time::Duration;
 
 use crate::{
     footprint::{self, Bearer},
     output::span,
 };
 
+pub use slots::Threads;
+use turns::in_order;
+
 mod aside;
 mod calls;
 mod idle;
 mod parts;
+mod slots;
 #[cfg(test)]
 mod tests;
+mod turns;
 
 /// Elements for each thread that a job uses well: 2,000 take some 120 us of a cycle, and a vote and its answer on an office network as long.
 pub const USED_WELL: u64 = 2_000;
@@ -52,6 +59,10 @@ pub struct Worker<'a> {
     pub bearer: Bearer<'a>,
     pub threads: u32,
     pub stands: Stands,
+    /// The slots of one process have the same number.
+    pub process: u64,
+    /// Whether it can give threads to another slot.
+    pub divides: bool,
 }
 
 /// What a worker does.
@@ -65,6 +76,8 @@ pub enum Stands {
         from: u32,
         to: Option<u32>,
     },
+    /// It is the slot that a division is about to open.
+    Due,
 }
 
 /// A job that runs or waits.
@@ -121,6 +134,8 @@ impl Claim<'_> {
 /// What is to be done.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Arrangement {
+    /// Workers whose threads change, before anything else is done.
+    pub threads: Vec<Threads>,
     /// Jobs that start, and the workers that each starts on.
     pub starts: Vec<(u32, Vec<u32>)>,
     /// Workers that are given to jobs that run.
@@ -159,6 +174,7 @@ pub fn arrange(
     table.fill();
     table.give_idle();
     table.even_out();
+    table.give_threads();
     table.tell(returns);
     table.done
 }
@@ -218,7 +234,7 @@ impl Row<'_> {
 struct Table<'a> {
     /// Those that run, then those that wait, in the order in which they are to start.
     rows: Vec<Row<'a>>,
-    workers: &'a [Worker<'a>],
+    workers: Vec<Worker<'a>>,
     /// Indices of workers that are idle and not given away, the fastest first.
     idle: Vec<usize>,
     available: Option<u64>,
@@ -226,7 +242,8 @@ struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    fn new(claims: &'a [Claim<'a>], workers: &'a [Worker<'a>], available: Option<u64>) -> Self {
+    fn new(claims: &'a [Claim<'a>], workers: &[Worker<'a>], available: Option<u64>) -> Self {
+        let (workers, threads) = slots::united(workers);
         let of = |job: u32, stands: &dyn Fn(Stands) -> Option<u32>| -> Vec<usize> {
             (0..workers.len()).filter(|&w| stands(workers[w].stands) == Some(job)).collect()
         };
@@ -253,7 +270,7 @@ impl<'a> Table<'a> {
             let leave = (0..workers.len()).filter(leaves);
             row.told_with = row.has.iter().copied().chain(leave).map(|w| workers[w].bearer.speed).sum();
         }
-        Self { rows, workers, idle, available, done: Arrangement::default() }
+        Self { rows, workers, idle, available, done: Arrangement { threads, ..Arrangement::default() } }
     }
 
     fn speed(&self, worker: usize) -> f64 {
@@ -312,7 +329,6 @@ impl<'a> Table<'a> {
 
     /// Says which of the waiting jobs may start beside those that run.
     fn admit(&mut self, returns: Option<u32>) {
-        let n = self.workers.len();
         // Of the reservation: when it could begin (s), and how many workers are left over then.
         let mut window: Option<(f64, usize)> = None;
         for row in 0..self.rows.len() {
@@ -332,7 +348,8 @@ impl<'a> Table<'a> {
                 }
             };
             self.rows[row].needs = needs;
-            let fits = self.pinned() + needs <= n;
+            while self.pinned() + needs > self.workers.len() && self.divide() {}
+            let fits = self.pinned() + needs <= self.workers.len();
             match &mut window {
                 None if fits => self.rows[row].is_in = true,
                 None => {
@@ -406,11 +423,14 @@ impl<'a> Table<'a> {
         let total: f64 = (0..self.workers.len()).map(|worker| self.speed(worker)).sum();
         let threads: u32 = self.workers.iter().map(|worker| worker.threads.max(1)).sum();
         let (of_worker, of_thread) = (total / n, total / f64::from(threads.max(1)));
+        let divides = self.workers.iter().any(|worker| worker.divides);
         let inside: Vec<usize> = (0..self.rows.len()).filter(|&row| self.rows[row].is_in).collect();
         let wants = inside.iter().map(|&row| {
             let Row { claim, needs, .. } = &self.rows[row];
             let used_well = claim.elements.div_ceil(USED_WELL).max(1) as f64 * of_thread;
-            let least = (*needs as f64 * of_worker).max(claim.speed);
+            let of_needed =
+                if divides && *needs == 1 { used_well.min(of_worker) } else { *needs as f64 * of_worker };
+            let least = of_needed.max(claim.speed);
             let most = used_well.max(least).min(claim.workers[1] as f64 * of_worker);
             parts::Want { priority: claim.priority, owner: claim.owner, least, most }
         });
@@ -432,12 +452,16 @@ impl<'a> Table<'a> {
                 let coming: f64 = self.rows[row].coming.iter().map(|&worker| self.speed(worker)).sum();
                 self.rows[row].given = self.pick(row, self.rows[row].part - coming);
             }
-            let given = self.rows[row].given.clone();
-            let enough = given.len() >= self.rows[row].needs;
-            if enough && self.lack(claim, given.iter().copied()).is_none() {
-                continue;
+            let lacks = |table: &Self| {
+                let Row { given, needs, .. } = &table.rows[row];
+                given.len() < *needs || table.lack(claim, given.iter().copied()).is_some()
+            };
+            while lacks(self) && self.rows[row].n() < claim.workers[1] && self.divide() {
+                self.rows[row].given.extend(self.idle.pop());
             }
-            self.call(row);
+            if lacks(self) {
+                self.call(row);
+            }
         }
     }
 
@@ -473,8 +497,10 @@ impl<'a> Table<'a> {
 
     /// Puts down who starts, who joins, and what each of the others waits for.
     fn tell(&mut self, returns: Option<u32>) {
+        let is_there = |worker: &usize| self.workers[*worker].stands != Stands::Due;
         let incarnations = |workers: &[usize]| -> Vec<u32> {
-            workers.iter().map(|&worker| self.workers[worker].incarnation).collect()
+            let there = workers.iter().copied().filter(is_there);
+            there.map(|worker| self.workers[worker].incarnation).collect()
         };
         let idle = self.workers.iter().filter(|worker| worker.stands == Stands::Idle).count();
         let soonest = self.rows.iter().filter(|row| row.claim.runs);
@@ -489,14 +515,15 @@ impl<'a> Table<'a> {
                     .extend(incarnations(&row.given).into_iter().map(|worker| (worker, claim.job)));
                 continue;
             }
-            let lacks =
-                || row.given.len() < row.needs || self.lack(claim, row.given.iter().copied()).is_some();
+            let given: Vec<usize> = row.given.iter().copied().filter(is_there).collect();
+            let lacks = || given.len() < row.needs || self.lack(claim, given.iter().copied()).is_some();
             if row.is_in && !lacks() {
                 self.done.starts.push((claim.job, incarnations(&row.given)));
                 continue;
             }
             let words = match &row.waits {
                 Some(words) => words.clone(),
+                None if given.len() < row.given.len() => "threads that another worker leaves it".to_owned(),
                 None if row.is_in => {
                     let mut from: Vec<u32> =
                         row.coming.iter().filter_map(|&worker| self.comes_from(worker)).collect();
@@ -538,29 +565,10 @@ impl<'a> Table<'a> {
     /// The job that a worker leaves.
     fn comes_from(&self, worker: usize) -> Option<u32> {
         match self.workers[worker].stands {
-            Stands::Idle => None,
+            Stands::Idle | Stands::Due => None,
             Stands::At(job) | Stands::Called { from: job, .. } => Some(job),
         }
     }
-}
-
-/// Those that run, then those that wait in the order in which they are to start: those that were interrupted, then by priority, then the
-/// jobs of owners in turn, then the first come.
-fn in_order<'a>(claims: &'a [Claim<'a>]) -> Vec<&'a Claim<'a>> {
-    let (mut order, mut waiting): (Vec<&Claim<'_>>, Vec<_>) = claims.iter().partition(|claim| claim.runs);
-    let mut of_owner: BTreeMap<&str, usize> = BTreeMap::new();
-    order.iter().for_each(|claim| *of_owner.entry(claim.owner).or_default() += 1);
-    let urgency = |claim: &Claim<'_>| (claim.before.is_none() || claim.aside, Reverse(claim.priority));
-    waiting.sort_by_key(|claim| (urgency(claim), claim.job));
-    let turn = |claim: &'a Claim<'a>| {
-        let turn = of_owner.entry(claim.owner).or_default();
-        *turn += 1;
-        (*turn, claim)
-    };
-    let mut turns: Vec<(usize, &Claim<'_>)> = waiting.into_iter().map(turn).collect();
-    turns.sort_by_key(|(turn, claim)| (urgency(claim), *turn, claim.job));
-    order.extend(turns.into_iter().map(|(_, claim)| claim));
-    order
 }
 
 /// Which job ends first, and when.

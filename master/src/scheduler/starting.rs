@@ -6,7 +6,11 @@ use std::{
 };
 
 use deck::physics::GRIND_NS;
-use protocol::request::{Ended, State};
+use protocol::{
+    message::ToWorker,
+    order::Place,
+    request::{Ended, State},
+};
 use tracing::{info, warn};
 
 use super::{Running, Scheduler, allotment};
@@ -16,7 +20,7 @@ use crate::{
     hosts::{self, Host},
     notice::Notice,
     queue::{Change, Entry},
-    scheduler::allotment::{Arrangement, Call, Claim, Stands, Worker},
+    scheduler::allotment::{Arrangement, Call, Claim, Stands, Threads, Worker},
     service::{self, Order},
     snapshot::store,
 };
@@ -29,9 +33,6 @@ impl Scheduler {
             let what = format!("{}; tried again within {} s", pause.why, pause.seconds);
             return waiting.iter().for_each(|entry| self.wait_for(entry.id, what.clone()));
         }
-        if waiting.is_empty() && self.running.is_empty() {
-            return;
-        }
         let running = self.running.keys().filter_map(|&job| self.queue.get(job));
         let claims: Vec<Claim<'_>> = running
             .map(|entry| self.claim(entry, true))
@@ -39,8 +40,11 @@ impl Scheduler {
             .collect();
         let workers: Vec<Worker<'_>> = self.hosts.connected().filter_map(|host| self.worker(host)).collect();
         let available = footprint::available();
-        let Arrangement { starts, joins, calls, stores, waits, .. } =
+        let Arrangement { threads, starts, joins, calls, stores, waits, .. } =
             allotment::arrange(&claims, &workers, self.started.elapsed(), available);
+        for threads in threads {
+            self.set_threads(threads);
+        }
         for (job, what) in waits {
             self.wait_for(job, what);
         }
@@ -98,7 +102,29 @@ impl Scheduler {
             bearer: link.bearer(),
             threads: link.spec.threads,
             stands,
+            process: host.nonce,
+            divides: link.divides,
         })
+    }
+
+    /// Has a worker go on with other threads.
+    fn set_threads(&mut self, Threads { worker, computes, apart }: Threads) {
+        let Some(link) = self.worker_links.get_mut(&worker) else { return };
+        // One that cannot be reached is found lost by its connection's task.
+        if link.send(Place::default(), &ToWorker::Threads { computes, apart }).is_err() {
+            return;
+        }
+        let name = link.spec.name.clone();
+        if computes == 0 {
+            info!("worker {name} gives its threads back");
+            link.delivery.expect_end();
+            self.worker_links.remove(&worker);
+            self.hosts.forget(worker);
+            return;
+        }
+        link.compute_with(computes);
+        info!(threads = computes, apart, "worker {name} goes on with other threads");
+        self.hosts.compute_with(worker, &link.spec);
     }
 
     /// Has a job stored, for one that came before it.

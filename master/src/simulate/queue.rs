@@ -292,6 +292,8 @@ impl Course<'_> {
             bearer: Bearer { name: "", speed: self.costs.cluster.speeds[index], memory: 0 },
             threads: 1,
             stands,
+            process: index as u64,
+            divides: false,
         };
         let workers: Vec<Worker<'_>> = self.stands.iter().enumerate().map(worker).collect();
         let Arrangement { starts, joins, calls, stores, reserved, .. } = policy(&claims, &workers);

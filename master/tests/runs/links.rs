@@ -31,6 +31,7 @@ use worker::{
     daemon::{Service, compute_pool},
     owner::Share,
     peers::Peers,
+    slots::Slot,
 };
 
 const PLATES: &str = include_str!("../../../deck/examples/plates-free-slip.toml");
@@ -115,6 +116,7 @@ where
                     peers,
                     compute: |machine, task, _| machine.run(task),
                     share: Share::default(),
+                    slot: Slot::whole(1),
                 },
             )
             .await

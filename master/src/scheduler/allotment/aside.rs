@@ -2,13 +2,16 @@
 
 use std::cmp::Reverse;
 
-use super::{Claim, Row, Table, in_order};
+use super::{Claim, Row, Table, turns::in_order};
 
 impl Table<'_> {
     /// Has jobs stored that came after the one that waits in `row`, if they alone keep it from beginning: they took longer than was
     /// expected, or those before it ended sooner. They wait behind it and lose nothing. True if it can begin without them, or without
     /// jobs that end soon in any case.
     pub(super) fn set_aside(&mut self, row: usize) -> bool {
+        if !self.is_settled() {
+            return false;
+        }
         let lacks = (self.pinned() + self.rows[row].needs).saturating_sub(self.workers.len());
         let end_soon = self.rows.iter().filter(|other| other.is_in && other.ends_soon());
         let mut freed: usize = end_soon.map(Row::floor).sum();

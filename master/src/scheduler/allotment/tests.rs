@@ -34,6 +34,8 @@ fn workers(speeds: &[f64], stands: &[Stands]) -> Vec<Worker<'static>> {
         bearer: Bearer { name: NAMES[i], speed: speeds[i], memory: 0 },
         threads: 1,
         stands: stands.get(i).copied().unwrap_or(Stands::Idle),
+        process: i as u64,
+        divides: false,
     };
     (0..speeds.len()).map(of).collect()
 }
@@ -331,4 +333,115 @@ fn jobs_that_pass_a_reservation_call_no_workers_of_those_that_it_waits_for() {
     let told = arranged(&claims, &workers(&[1.0; 3], &[Stands::At(1), Stands::At(2), called]));
     assert_eq!(told.reserved, Some((3, f64::INFINITY)));
     assert_eq!(told.waits[0].1, "3 workers, 0 are idle; job 1 ends in about 8 min");
+}
+
+/// Workers that divide, each of (process, threads, what it does), of speed 1 and with 1 GB a thread.
+fn slots(of: &[(u64, u32, Stands)]) -> Vec<Worker<'static>> {
+    let slot = |(i, &(process, threads, stands)): (usize, &(u64, u32, Stands))| Worker {
+        incarnation: i as u32 + 1,
+        bearer: Bearer {
+            name: NAMES[i],
+            speed: f64::from(threads),
+            memory: 1_000_000_000 * u64::from(threads),
+        },
+        threads,
+        stands,
+        process,
+        divides: true,
+    };
+    of.iter().enumerate().map(slot).collect()
+}
+
+fn threads(worker: u32, computes: u32, apart: u32) -> Threads {
+    Threads { worker, computes, apart }
+}
+
+#[test]
+fn small_jobs_share_a_host_by_its_threads() {
+    // The first has all of it until another one comes.
+    let alone = arranged(&[job(1, 3_000)], &slots(&[(7, 8, Stands::Idle)]));
+    assert_eq!((alone.threads, alone.starts), (vec![], vec![(1, vec![1])]));
+    let runs = |number| running(number, 3_000, 60.0);
+    let at_one = slots(&[(7, 8, Stands::At(1))]);
+    let second = arranged(&[runs(1), job(2, 1_000_000)], &at_one);
+    assert_eq!((second.threads, second.starts), (vec![threads(1, 2, 6)], vec![]));
+    assert_eq!(second.waits, said(&[(2, "threads that another worker leaves it")]));
+    let called = slots(&[(7, 2, Stands::At(1)), (7, 6, Stands::Idle)]);
+    let second = arranged(&[runs(1), job(2, 1_000_000)], &called);
+    assert_eq!((second.threads, second.starts), (vec![], vec![(2, vec![2])]));
+    // Nobody calls threads of the large one, and it leaves none: the next one waits.
+    let full = slots(&[(7, 2, Stands::At(1)), (7, 6, Stands::At(2))]);
+    let large = running(2, 1_000_000, 900.0);
+    assert_eq!(arranged(&[runs(1), large.clone()], &full), Arrangement::default());
+    let third = arranged(&[runs(1), large.clone(), job(3, 3_000)], &full);
+    assert_eq!((third.threads, third.calls, third.starts), (vec![], vec![], vec![]));
+
+    // Rather than that a large job on two hosts is dealt out anew, the small one leaves threads.
+    let hosts = slots(&[(7, 8, Stands::At(1)), (8, 8, Stands::At(2)), (9, 8, Stands::At(2))]);
+    let third = arranged(&[runs(1), large.clone(), job(3, 3_000)], &hosts);
+    assert_eq!((third.threads, third.calls), (vec![threads(1, 2, 6)], vec![]));
+
+    // Not one that needs the memory or the speed, uses more than half, ends soon, or whose worker does not divide.
+    let keeps = |claim: Claim<'_>| {
+        let told = arranged(&[claim, job(2, 3_000)], &at_one);
+        assert_eq!((told.threads, told.starts), (vec![], vec![]));
+    };
+    keeps(running(1, 8_001, 60.0));
+    keeps(running(1, 3_000, 0.1));
+    let mut whole = at_one.clone();
+    whole[0].divides = false;
+    assert_eq!(arranged(&[runs(1), job(2, 3_000)], &whole).threads, []);
+}
+
+#[test]
+fn idle_slots_become_one_again_and_threads_go_back_to_the_job_beside_them() {
+    let idle =
+        slots(&[(7, 2, Stands::Idle), (7, 5, Stands::Idle), (9, 4, Stands::Idle), (7, 1, Stands::At(1))]);
+    let united = [threads(2, 0, 0), threads(1, 7, 0)];
+    assert_eq!(arranged(&[], &idle[..3]).threads, united);
+    // A job starts on the whole at once.
+    let runs = running(1, 400, 60.0);
+    let large = arranged(&[runs.clone(), job(2, 1_000_000)], &idle);
+    assert_eq!((&large.threads[..], large.starts), (&united[..], vec![(2, vec![1, 3])]));
+
+    // 400 elements are no faster on two threads; 4,000 are on eight, and have them while nobody waits.
+    assert_eq!(arranged(std::slice::from_ref(&runs), &idle).threads, united);
+    let beside = arranged(&[running(1, 4_000, 60.0)], &[idle[1], idle[3]]);
+    assert_eq!((beside.threads, beside.joins), (vec![threads(2, 0, 0), threads(4, 6, 0)], vec![]));
+    // So has one that would else have the slot as a worker more.
+    let wide = arranged(&[running(1, 1_000_000, 900.0)], &idle[1..]);
+    assert_eq!((wide.threads, wide.joins), (vec![threads(2, 0, 0), threads(4, 6, 0)], vec![(3, 1)]));
+}
+
+#[test]
+fn a_row_of_small_jobs_fills_a_host_and_leaves_it_whole() {
+    // Each slot calls as soon as it is opened; each job ends when all run.
+    let mut workers = slots(&[(7, 8, Stands::Idle)]);
+    let mut claims: Vec<Claim<'_>> = (1..=8).map(|number| job(number, 1_000)).collect();
+    for _ in 0..20 {
+        let told = arranged(&claims, &workers);
+        assert!(told.stores.is_empty() && told.calls.is_empty(), "{told:?}");
+        for Threads { worker, computes, apart } in told.threads {
+            let at = worker as usize - 1;
+            workers[at].threads = computes;
+            workers[at].bearer.speed = f64::from(computes);
+            let number = workers.len();
+            workers.extend((apart > 0).then(|| Worker {
+                incarnation: number as u32 + 1,
+                bearer: Bearer { name: NAMES[number], speed: f64::from(apart), memory: 0 },
+                threads: apart,
+                stands: Stands::Idle,
+                ..workers[at]
+            }));
+        }
+        for (job, on) in told.starts {
+            (claims[job as usize - 1].runs, claims[job as usize - 1].left_s) = (true, Some(60.0));
+            on.iter().for_each(|&worker| workers[worker as usize - 1].stands = Stands::At(job));
+        }
+    }
+    assert!(claims.iter().all(|claim| claim.runs), "{claims:?}");
+    assert_eq!(workers.iter().map(|worker| worker.threads).collect::<Vec<_>>(), [1; 8]);
+    workers.iter_mut().for_each(|worker| worker.stands = Stands::Idle);
+    let united = arranged(&[], &workers).threads;
+    assert_eq!(united.last().map(|threads| threads.computes), Some(8), "{united:?}");
 }
