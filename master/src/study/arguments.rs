@@ -33,7 +33,7 @@ pub struct StudyArgs {
     /// Remove the results from --cache that were not used for the longest time when all take more gigabytes
     #[arg(long, value_name = "GB", default_value_t = 10.0, value_parser = crate::command::amount)]
     pub keep_gb: f64,
-    /// Runs at once on this PC [default: its cores]
+    /// Runs at once on this PC [default: one more than its cores]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub runs: Option<u32>,
     /// Compute threads of each run on this PC [default: its cores, shared by the runs that there are]

@@ -32,8 +32,9 @@ pub struct Local {
     threads: Option<usize>,
     /// Runs at once.
     most: usize,
-    /// Cores that no run has.
-    free: usize,
+    cores: usize,
+    /// Threads of the runs under way.
+    busy: usize,
     under_way: usize,
     stop: Arc<AtomicBool>,
     send: Sender<(usize, Finished)>,
@@ -41,14 +42,17 @@ pub struct Local {
 }
 
 impl Local {
-    /// With so many runs at once, each of so many threads, where the user said so.
+    /// With so many runs at once, each of so many threads, where the user said so. There is one more than cores where each may have one, so
+    /// that none of them rests while a run reads its deck, makes its mesh or waits for the disk.
     pub fn new(cache: Arc<Cache>, runs: Option<u32>, threads: Option<u32>) -> Self {
         let cores = worker::processors::cores();
         let threads = threads.map(|threads| threads as usize);
-        let most = runs.map_or_else(|| (cores / threads.unwrap_or(1)).max(1), |runs| runs as usize);
+        let of_each = threads.unwrap_or(1);
+        let most = (cores / of_each).max(1) + usize::from(of_each == 1);
+        let most = runs.map_or(most, |runs| runs as usize);
         let (send, receive) = mpsc::channel();
         let stop = Arc::default();
-        Self { cache, threads, most, free: cores, under_way: 0, stop, send, receive }
+        Self { cache, threads, most, cores, busy: 0, under_way: 0, stop, send, receive }
     }
 }
 
@@ -63,7 +67,8 @@ impl Place for Local {
     fn take(&mut self, task: Task, waiting: usize) -> Result<(), String> {
         let at_once = (waiting + 1).min(self.most.saturating_sub(self.under_way).max(1));
         let useful = (task.prepared.elements as usize / ELEMENTS_PER_THREAD).max(1);
-        let threads = self.threads.unwrap_or_else(|| (self.free / at_once).clamp(1, useful));
+        let free = self.cores.saturating_sub(self.busy);
+        let threads = self.threads.unwrap_or_else(|| (free / at_once).clamp(1, useful));
         let (cache, stop, send) = (Arc::clone(&self.cache), Arc::clone(&self.stop), self.send.clone());
         let run = move || {
             let bug = || {
@@ -79,7 +84,7 @@ impl Place for Local {
         let spawned = std::thread::Builder::new().name("run".to_owned()).spawn(run);
         spawned.map_err(|e| format!("a thread for a run: {e}"))?;
         self.under_way += 1;
-        self.free = self.free.saturating_sub(threads);
+        self.busy += threads;
         Ok(())
     }
 
@@ -93,7 +98,7 @@ impl Place for Local {
         let mut finished = Vec::new();
         for (threads, run) in std::iter::once(first).chain(self.receive.try_iter()) {
             self.under_way -= 1;
-            self.free += threads;
+            self.busy -= threads;
             finished.push(run);
         }
         Ok(finished)

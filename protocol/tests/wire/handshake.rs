@@ -39,7 +39,7 @@ fn greeting_has_its_golden_bytes() {
     let (_, frame) = Client::new(&hello()).expect("a good greeting");
     #[rustfmt::skip]
     let golden = [
-        12, 0,                                           // version
+        13, 0,                                           // version
         0, 0, 0, 0,                                      // worker
         4, 0, 0, 0, 0, 0, 0, 0, b'p', b'c', b'-', b'1',  // name
         0, 0, 0, 0, 0, 0, 0xf8, 0x3f,                    // speed 1.5
@@ -51,6 +51,7 @@ fn greeting_has_its_golden_bytes() {
         0,                                               // no place in a job
         0,                                               // no proof
         0, 0, 0, 0, 0, 0, 0, 0,                          // does not say what memory it has
+        0,                                               // does not divide
     ];
     assert_eq!(frame.payload, golden);
     assert_eq!(frame.header, Header::new(Kind::Hello));
@@ -123,7 +124,7 @@ fn frames_that_are_no_greeting_are_refused() {
     let (_, mut frame) = Client::new(&hello()).expect("a good greeting");
     frame.payload.push(0);
     let reason = refusal(policy(), &frame);
-    assert_eq!(reason, "hello: message of 63 bytes in a payload of 64");
+    assert_eq!(reason, "hello: message of 64 bytes in a payload of 65");
     for length in 0..frame.payload.len() - 1 {
         let cut = Frame::new(frame.header, frame.payload[..length].to_vec());
         assert!(refusal(policy(), &cut).starts_with("hello: control message: "), "{length} bytes");
