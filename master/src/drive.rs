@@ -51,6 +51,8 @@ pub enum Input {
     Joined(WorkerLink),
     /// Another job needs the worker on this connection.
     Yield(u32),
+    /// The worker on this connection has so many threads from now on.
+    Threads(u32, u32),
     /// Look at what is to be stopped.
     Wake,
     /// This process has to leave.
@@ -310,13 +312,17 @@ impl Driver {
         }
     }
 
-    /// Another job needs a worker; one that is not this job's any more is none of its business.
-    fn give_up(&mut self, incarnation: u32, sink: &mut dyn Sink) -> Result<(), Error> {
+    /// The worker on a connection; none if it is not this job's any more.
+    fn member_on(&self, incarnation: u32) -> Option<usize> {
         let is_it = |member: &Member| member.link.incarnation == incarnation && !member.is_freed();
-        match self.members.iter().rposition(is_it) {
-            Some(worker) => self.apply(Event::Yield(worker), sink),
-            None => Ok(()),
-        }
+        self.members.iter().rposition(is_it)
+    }
+
+    /// A worker's threads have changed.
+    fn set_threads(&mut self, incarnation: u32, threads: u32, sink: &mut dyn Sink) -> Result<(), Error> {
+        let Some(worker) = self.member_on(incarnation) else { return Ok(()) };
+        self.members[worker].link.compute_with(threads);
+        self.apply(Event::Threads(worker, threads), sink)
     }
 
     /// Tells whether a worker computes a part of its time only, when that has changed.
@@ -394,7 +400,12 @@ impl Driver {
                     self.apply(Event::Sorted(sorted), sink)?;
                 }
                 Input::Joined(worker_link) => self.take_in(worker_link, sink)?,
-                Input::Yield(incarnation) => self.give_up(incarnation, sink)?,
+                Input::Yield(incarnation) => {
+                    if let Some(worker) = self.member_on(incarnation) {
+                        self.apply(Event::Yield(worker), sink)?;
+                    }
+                }
+                Input::Threads(incarnation, threads) => self.set_threads(incarnation, threads, sink)?,
                 Input::Wake => self.look_for_late(sink)?,
                 Input::Suspend => {
                     self.ends = true;

@@ -27,6 +27,14 @@ pub struct WorkerSpec {
     pub threads: u32,
 }
 
+impl WorkerSpec {
+    /// It has so many threads from now on, and speed in proportion.
+    pub fn compute_with(&mut self, threads: u32) {
+        self.speed *= f64::from(threads) / f64::from(self.threads.max(1));
+        self.threads = threads;
+    }
+}
+
 /// What happens to a job. Workers have the index at which they came: first those of [`Job::new`](crate::job::Job::new),
 /// then one after another as they join.
 pub enum Event {
@@ -44,6 +52,8 @@ pub enum Event {
     Joined(WorkerSpec),
     /// Another job needs a worker: it is to be freed at the next plan boundary.
     Yield(usize),
+    /// A worker has so many threads from now on: what is dealt out next follows that.
+    Threads(usize, u32),
     /// The time that [`Action::Timer`] asked for has passed.
     Timer,
 }

@@ -171,6 +171,7 @@ impl Job {
             Event::Lost(index, why) => return self.lost(index, why, actions),
             Event::Joined(spec) => return self.joined(spec, actions),
             Event::Yield(index) => self.yield_worker(index, actions),
+            Event::Threads(index, threads) => self.workers.set_threads(index, threads),
             // An interval that is taken again ends where it did before.
             Event::Timer if self.twice.until().is_some() => {
                 actions.extend(self.options.keep.seconds().map(Action::Timer));

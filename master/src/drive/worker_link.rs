@@ -50,7 +50,7 @@ impl WorkerLink {
     pub(crate) fn compute_with(&mut self, threads: u32) {
         let part = f64::from(threads) / f64::from(self.spec.threads.max(1));
         self.memory = (self.memory as f64 * part) as u64;
-        self.spec = WorkerSpec { threads, speed: self.spec.speed * part, ..self.spec.clone() };
+        self.spec.compute_with(threads);
     }
 
     /// Queues a message to it.

@@ -119,6 +119,13 @@ impl Workers {
         }
     }
 
+    /// One has so many threads from now on.
+    pub(super) fn set_threads(&mut self, index: usize, threads: u32) {
+        if let Some(worker) = self.all.get_mut(index) {
+            worker.spec.compute_with(threads);
+        }
+    }
+
     /// The workers is dealt work by other speeds from now on.
     pub(super) fn set_speeds(&mut self, at_work: &[usize], speeds: &[f64]) {
         for (&index, &speed) in at_work.iter().zip(speeds) {
@@ -161,6 +168,18 @@ mod tests {
         assert_eq!(workers.lose(1), Ok(false));
         assert_eq!(workers.lose(3), Err(Error::Unknown { worker: 3, known: 3 }));
         assert_eq!(workers.alive(), [0, 2]);
+    }
+
+    #[test]
+    fn a_worker_with_twice_the_threads_is_dealt_twice_the_work() {
+        let mut workers = three();
+        workers.set_speeds(&[1], &[0.9]);
+        workers.set_threads(1, 4);
+        assert_eq!((workers.spec(1).speed, workers.spec(1).threads), (3.6, 4));
+        workers.set_threads(1, 2);
+        assert_eq!((workers.spec(1).speed, workers.spec(1).threads), (1.8, 2));
+        workers.set_threads(7, 2);
+        assert_eq!(workers.spec(0).threads, 1);
     }
 
     #[test]

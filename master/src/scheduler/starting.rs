@@ -125,6 +125,12 @@ impl Scheduler {
         link.compute_with(computes);
         info!(threads = computes, apart, "worker {name} goes on with other threads");
         self.hosts.compute_with(worker, &link.spec);
+        if let Some(hosts::State::Busy(job)) = self.hosts.on(worker).map(|host| &host.state)
+            && let Some(running) = self.running.get(job)
+        {
+            // A full line makes the next deal of its work worse, and nothing else.
+            let _ = running.line.try_send(Input::Threads(worker, computes));
+        }
     }
 
     /// Has a job stored, for one that came before it.

@@ -114,6 +114,11 @@ impl Play {
                 }
             }
             Fault::Yield { host } => {
+                // Another one has other threads from now on: work is dealt out by what they are.
+                if let Some(member) = pick(host + 1).and_then(|host| sessions.hosts[host].member) {
+                    self.world.apply(Event::Threads(member, 1 + host as u32 % 4))?;
+                }
+                let sessions = &self.world.sessions;
                 if let Some(member) = pick(host).and_then(|host| sessions.hosts[host].member) {
                     self.world.apply(Event::Yield(member))?;
                 }
