@@ -41,7 +41,7 @@ fn reference() -> &'static str {
 }
 
 /// Cycles of a job that goes on while something is done to its cluster: some four seconds of one core.
-const LONG: &str = "20000";
+const LONG: &str = "12000";
 
 /// The digest after [`LONG`] cycles.
 fn long_reference() -> &'static str {
