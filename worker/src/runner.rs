@@ -56,8 +56,6 @@ pub struct Runner {
     share: Share,
     /// Its threads.
     slot: Slot,
-    /// Set once it is to compute with another number of threads.
-    threads: Option<u32>,
 }
 
 impl Runner {
@@ -77,11 +75,10 @@ impl Runner {
             leaving: None,
             share,
             slot,
-            threads: None,
         }
     }
 
-    /// Takes one input after another until there can be no more, or until it is to go on with so many threads.
+    /// Takes one input after another until there can be no more, or until its slot has other threads than the pool that it runs on; gives how many.
     ///
     /// # Errors
     /// Why the connection to the master must end: [`Error::Left`] if it was asked to leave and holds nothing any more.
@@ -108,7 +105,8 @@ impl Runner {
             {
                 self.send(&ready)?;
             }
-            if let Some(threads) = self.threads.take() {
+            let threads = self.slot.threads();
+            if threads as usize != rayon::current_num_threads() {
                 return Ok(Some(threads));
             }
         }
@@ -167,11 +165,10 @@ impl Runner {
             return Err(Error::Message("asked to give all threads back in the middle of a job".to_owned()));
         }
         self.slot.divide(computes, apart)?;
-        if computes == 0 {
-            return Err(Error::Left { reason: "another slot of its process has its threads".to_owned() });
+        match computes {
+            0 => Err(Error::Left { reason: "another slot of its process has its threads".to_owned() }),
+            _ => Ok(()),
         }
-        self.threads = Some(computes);
-        Ok(())
     }
 
     fn step(&mut self, Step { heard, relay }: Step) -> Result<()> {

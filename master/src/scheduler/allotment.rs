@@ -103,6 +103,11 @@ pub struct Claim<'a> {
 }
 
 impl Claim<'_> {
+    /// Threads of which each has at most so many of its elements.
+    fn threads(&self, elements: u64) -> u32 {
+        u32::try_from(self.elements.div_ceil(elements)).unwrap_or(u32::MAX).max(1)
+    }
+
     /// Workers that it needs by its options: what was begun with enough goes on with any.
     fn needs(&self) -> usize {
         if self.runs || self.before.is_some() { 1 } else { self.workers[0].max(1) }
@@ -348,7 +353,9 @@ impl<'a> Table<'a> {
                 }
             };
             self.rows[row].needs = needs;
-            while self.pinned() + needs > self.workers.len() && self.divide() {}
+            if self.pinned() + needs <= self.workers.len() + self.spares().count() {
+                while self.pinned() + needs > self.workers.len() && self.divide() {}
+            }
             let fits = self.pinned() + needs <= self.workers.len();
             match &mut window {
                 None if fits => self.rows[row].is_in = true,
@@ -427,7 +434,7 @@ impl<'a> Table<'a> {
         let inside: Vec<usize> = (0..self.rows.len()).filter(|&row| self.rows[row].is_in).collect();
         let wants = inside.iter().map(|&row| {
             let Row { claim, needs, .. } = &self.rows[row];
-            let used_well = claim.elements.div_ceil(USED_WELL).max(1) as f64 * of_thread;
+            let used_well = f64::from(claim.threads(USED_WELL)) * of_thread;
             let of_needed =
                 if divides && *needs == 1 { used_well.min(of_worker) } else { *needs as f64 * of_worker };
             let least = of_needed.max(claim.speed);

@@ -110,6 +110,10 @@ impl Scheduler {
     /// Has a worker go on with other threads.
     fn set_threads(&mut self, Threads { worker, computes, apart }: Threads) {
         let Some(link) = self.worker_links.get_mut(&worker) else { return };
+        if computes == 0 {
+            // Before it hears of it: its answer is the end.
+            link.delivery.expect_end();
+        }
         // One that cannot be reached is found lost by its connection's task.
         if link.send(Place::default(), &ToWorker::Threads { computes, apart }).is_err() {
             return;
@@ -117,7 +121,6 @@ impl Scheduler {
         let name = link.spec.name.clone();
         if computes == 0 {
             info!("worker {name} gives its threads back");
-            link.delivery.expect_end();
             self.worker_links.remove(&worker);
             self.hosts.forget(worker);
             return;

@@ -81,9 +81,8 @@ impl Table<'_> {
 
     /// Whether a job is faster with one more worker.
     fn helps(&self, row: usize) -> bool {
-        let threads = |worker: usize| u64::from(self.workers[worker].threads.max(1));
-        let has: u64 = self.rows[row].all().map(threads).sum();
-        has == 0 || has < self.rows[row].claim.elements.div_ceil(HELPS)
+        let has: u32 = self.rows[row].all().map(|worker| self.workers[worker].threads.max(1)).sum();
+        has == 0 || has < self.rows[row].claim.threads(HELPS)
     }
 
     /// Seconds to the end of a job, with the workers that it has now.

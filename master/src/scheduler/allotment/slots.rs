@@ -2,7 +2,7 @@
 
 use std::{cmp::Reverse, collections::BTreeMap};
 
-use super::{Claim, HELPS, Stands, Table, USED_WELL, Worker};
+use super::{HELPS, Stands, Table, USED_WELL, Worker};
 use crate::footprint::{self, Bearer};
 
 /// A worker that is to go on with so many threads; with none, which an idle one is told, another slot of its process has them.
@@ -12,11 +12,6 @@ pub struct Threads {
     pub computes: u32,
     /// Those that call as another worker.
     pub apart: u32,
-}
-
-/// Threads of which each has at most so many elements of a job.
-fn threads_of(claim: &Claim<'_>, elements: u64) -> u32 {
-    u32::try_from(claim.elements.div_ceil(elements)).unwrap_or(u32::MAX).max(1)
 }
 
 /// The worker with so many of its threads, or of its process's.
@@ -53,29 +48,26 @@ pub(super) fn united<'a>(workers: &[Worker<'a>]) -> (Vec<Worker<'a>>, Vec<Thread
 }
 
 impl Table<'_> {
-    /// Has a job that runs on one worker, and uses half of its threads at most, leave the others to whoever lacks a worker: they are due, and
-    /// idle once they have called. False where there is none.
-    pub(super) fn divide(&mut self) -> bool {
-        let spare = |row: &usize| {
-            let row = &self.rows[*row];
-            let &[worker] = &row.has[..] else { return None };
-            let (uses, threads) = (threads_of(row.claim, USED_WELL), self.workers[worker].threads);
-            if row.n() > 1
-                || row.claim.elements == 0
-                || row.ends_soon()
-                || uses > threads / 2
-                || !self.workers[worker].divides
-            {
+    /// Of each job that runs on one worker and uses half of its threads at most: those that it can leave to others, the worker, and those that it uses.
+    pub(super) fn spares(&self) -> impl Iterator<Item = (u32, usize, u32)> + '_ {
+        self.rows.iter().filter_map(|row| {
+            let &[index] = &row.has[..] else { return None };
+            let (worker, uses) = (&self.workers[index], row.claim.threads(USED_WELL));
+            let leaves = worker.divides && uses <= worker.threads / 2;
+            if !leaves || row.n() > 1 || row.claim.elements == 0 || row.ends_soon() {
                 return None;
             }
-            let bearer = with(&self.workers[worker], uses).bearer;
+            let bearer = with(worker, uses).bearer;
             let goes_on = row.claim.lack([&bearer].into_iter()).is_none()
                 && footprint::shortage(row.claim.elements, None, &[bearer]).is_none();
-            goes_on.then_some((threads - uses, worker, uses))
-        };
-        let Some((apart, worker, computes)) = (0..self.rows.len()).filter_map(|row| spare(&row)).max() else {
-            return false;
-        };
+            goes_on.then_some((worker.threads - uses, index, uses))
+        })
+    }
+
+    /// Has the job that can leave most threads leave them to whoever lacks a worker: they are due, and idle once they have called. False
+    /// where there is none.
+    pub(super) fn divide(&mut self) -> bool {
+        let Some((apart, worker, computes)) = self.spares().max() else { return false };
         let whole = self.workers[worker];
         self.workers[worker] = with(&whole, computes);
         self.idle.push(self.workers.len());
@@ -84,36 +76,32 @@ impl Table<'_> {
         true
     }
 
-    /// Gives the threads of slots that nobody needs to a job on another slot of their process, if they make it faster; so do those that
-    /// such a job would else have as a worker more.
+    /// Gives the threads of slots that nobody needs to a job that has one worker, on another slot of their process, if they make it faster; so do
+    /// those that such a job would else have as a worker more. What a job has on several workers would have to be dealt out anew.
     pub(super) fn give_threads(&mut self) {
         if self.rows.iter().any(|row| !row.claim.runs) {
             return;
         }
         for row in 0..self.rows.len() {
-            let Some(&worker) = self.rows[row].has.iter().find(|&&worker| self.workers[worker].divides)
-            else {
-                continue;
-            };
+            let &[worker] = &self.rows[row].has[..] else { continue };
             let whole = self.workers[worker];
             let is_beside = |other: &usize| {
                 let other = &self.workers[*other];
                 other.process == whole.process && other.divides && other.stands == Stands::Idle
             };
-            let joins: Vec<usize> = self.rows[row].given.iter().copied().filter(is_beside).collect();
-            let helps = whole.threads < threads_of(self.rows[row].claim, HELPS);
-            let idle = self.idle.iter().copied().filter(|worker| helps && is_beside(worker));
-            let slots: Vec<usize> = joins.into_iter().chain(idle).collect();
+            let joins = self.rows[row].given.iter().copied().filter(is_beside);
+            let helps = whole.threads < self.rows[row].claim.threads(HELPS);
+            let idle = self.idle.iter().copied().filter(|other| helps && is_beside(other));
+            let slots: Vec<usize> = joins.chain(idle).collect();
             if slots.is_empty() {
                 continue;
             }
-            self.idle.retain(|worker| !slots.contains(worker));
-            self.rows[row].given.retain(|worker| !slots.contains(worker));
-            let of_slots: u32 = slots.iter().map(|&slot| self.workers[slot].threads).sum();
-            self.workers[worker] = with(&whole, whole.threads + of_slots);
+            self.idle.retain(|other| !slots.contains(other));
+            self.rows[row].given.retain(|other| !slots.contains(other));
+            let computes = whole.threads + slots.iter().map(|&slot| self.workers[slot].threads).sum::<u32>();
+            self.workers[worker] = with(&whole, computes);
             let incarnations = slots.iter().map(|&slot| self.workers[slot].incarnation);
             self.done.threads.extend(incarnations.map(|worker| Threads { worker, computes: 0, apart: 0 }));
-            let computes = whole.threads + of_slots;
             self.done.threads.push(Threads { worker: whole.incarnation, computes, apart: 0 });
         }
     }

@@ -394,6 +394,20 @@ fn small_jobs_share_a_host_by_its_threads() {
 }
 
 #[test]
+fn a_job_leaves_no_threads_to_one_that_could_not_begin_all_the_same_and_one_on_two_hosts_is_dealt_out_anew() {
+    let two = slots(&[(7, 8, Stands::At(1)), (8, 8, Stands::At(2))]);
+    let jobs = |needs| {
+        let large = Claim { workers: [needs, usize::MAX], ..job(3, 1_000_000) };
+        [running(1, 3_000, 60.0), running(2, 1_000_000, 900.0), large]
+    };
+    assert_eq!(arranged(&jobs(1), &two).threads, [threads(1, 2, 6)]);
+    assert_eq!(arranged(&jobs(2), &two).threads, [], "one slot more is not enough");
+    let beside = slots(&[(7, 2, Stands::At(2)), (7, 6, Stands::Idle), (8, 8, Stands::At(2))]);
+    let told = arranged(&[running(2, 1_000_000, 900.0)], &beside);
+    assert_eq!((told.threads, told.joins), (vec![], vec![(2, 2)]));
+}
+
+#[test]
 fn idle_slots_become_one_again_and_threads_go_back_to_the_job_beside_them() {
     let idle =
         slots(&[(7, 2, Stands::Idle), (7, 5, Stands::Idle), (9, 4, Stands::Idle), (7, 1, Stands::At(1))]);
