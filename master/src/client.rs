@@ -25,7 +25,6 @@ use arguments::{ClientArgs, MASTER, SubmitArgs};
 use crate::{
     deck_file::{self, doubt, gather_deck, warn},
     machine::host_name,
-    notify::notify,
     output::span,
     results::{Folder, Summary, Units, create_anew, summary::significant},
     shell::quoted,
@@ -262,6 +261,10 @@ fn line_of(status: &Status) -> String {
 /// # Errors
 /// Faults of the deck, or whatever went wrong on the way.
 pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
+    args.notify.check()?;
+    if args.notify.is_some() && !args.wait {
+        return Err("--notify, --webhook and --mail of `submit` need --wait; `bolide master --webhook URL` tells of every job".to_owned());
+    }
     let name = args.deck.display().to_string();
     let text = gather_deck(&args.deck, &args.reading.options())?;
     // The master answers with faults; what a run does otherwise than the deck says is told here.
@@ -285,7 +288,7 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
             eprintln!("job {job} submitted");
         }
         let result = finish(client, &args.at, Some(job), None);
-        notify(args.notify.as_deref(), &job.to_string(), None, &result);
+        args.notify.tell_of(&job.to_string(), None, &result);
         return result;
     }
     if args.at.json {

@@ -25,6 +25,7 @@ use crate::{
     certs::arguments::Certs,
     client::arguments::{ClientArgs, SubmitArgs},
     export::ExportArgs,
+    notify::NotifyArgs,
     picture::arguments::PictureArgs,
     report::ReportArgs,
     study::arguments::StudyArgs,
@@ -259,9 +260,9 @@ pub struct RunArgs {
     /// Write a trace of the last cycles of every worker for Perfetto
     #[arg(long, value_name = "FILE", help_heading = ADVANCED)]
     pub trace: Option<PathBuf>,
-    /// When it is over run this in a shell, with BOLIDE_JOB, BOLIDE_STATE (done, failed or stopped), BOLIDE_FOLDER and BOLIDE_REASON set
-    #[arg(long, value_name = "COMMAND")]
-    pub notify: Option<String>,
+    /// Whom to tell when it is over
+    #[command(flatten)]
+    pub notify: NotifyArgs,
     /// Print the summary alone, as JSON, on standard output
     #[arg(long)]
     pub json: bool,
@@ -368,6 +369,9 @@ pub struct MasterArgs {
     /// Remove the oldest jobs that are over, with their results, when those of all take more gigabytes [default: never]
     #[arg(long, value_name = "GB", value_parser = amount)]
     pub keep_gb: Option<f64>,
+    /// Whom to tell of each job that is over
+    #[command(flatten)]
+    pub notify: NotifyArgs,
     /// Without certificates serve every user of this PC, not only its own and root
     #[arg(long, conflicts_with = "certs")]
     pub share: bool,

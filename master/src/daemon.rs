@@ -20,6 +20,7 @@ use crate::{
     interrupt::stop_on_interrupt,
     machine::host_name,
     notice::{Notice, WAITING_NOTICES},
+    notify::Notifier,
     scheduler::{Scheduler, retention::Limits},
     scrub,
     spool::Spool,
@@ -51,6 +52,7 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         .thread_name("link")
         .build()
         .map_err(|e| format!("threads of links: {e}"))?;
+    let notifier = Notifier::start(&args.notify)?;
     let dead_after = Duration::from_secs_f64(args.dead_after);
     let result = runtime.block_on(async {
         let listener = TcpListener::bind(args.listen).await.map_err(|e| format!("{}: {e}", args.listen))?;
@@ -77,7 +79,8 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         };
         let over = left.jobs.iter().filter(|(record, _)| record.ended.is_some());
         scrub::begin(over.map(|(record, _)| (record.job, spool.results(record.job))).collect());
-        let scheduler = Scheduler::new(args.spool.clone(), spool, left, notices, board).keeping(limits);
+        let scheduler =
+            Scheduler::new(args.spool.clone(), spool, left, notices, board, notifier).keeping(limits);
         scheduler.run(heard, &stop, &acceptor).await;
         Ok(ExitCode::SUCCESS)
     });

@@ -19,7 +19,6 @@ use crate::{
     export,
     interrupt::stop_on_interrupt,
     job::Job,
-    notify::notify,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     picture,
@@ -43,14 +42,15 @@ pub fn folder_for(args: &RunArgs) -> PathBuf {
     })
 }
 
-/// [`run`], and then the command that the user wants to be told by.
+/// [`run`], and then those are told whom the user wants told.
 ///
 /// # Errors
 /// As [`run`].
 pub fn run_and_tell(args: &RunArgs) -> Result<ExitCode, String> {
+    args.notify.check()?;
     let result = run(args);
     let folder = (!args.job.no_output).then(|| folder_for(args));
-    notify(args.notify.as_deref(), &args.deck.display().to_string(), folder.as_deref(), &result);
+    args.notify.tell_of(&args.deck.display().to_string(), folder.as_deref(), &result);
     result
 }
 

@@ -28,6 +28,7 @@ use crate::{
     hosts::Hosts,
     http::board::Board,
     notice::{Error, Notice},
+    notify::{Notifier, Over},
     queue::{self, Change, Entry, Queue, Size, Starts, Wish, is_over},
     scheduler::{allotment::Call, retention::Limits},
     snapshot::store,
@@ -74,6 +75,8 @@ pub struct Scheduler {
     limits: Limits,
     /// When that was looked at last.
     looked: Option<Instant>,
+    /// Tells of each job that is over.
+    notifier: Option<Notifier>,
 }
 
 /// The queue waits: this host has no room, files or memory left. The job that met it is tried again and goes on where it was stored.
@@ -118,6 +121,7 @@ impl Scheduler {
         left: Left,
         notices: mpsc::Sender<Notice>,
         board: Option<Arc<Board>>,
+        notifier: Option<Notifier>,
     ) -> Self {
         let mut owner = Self {
             folder,
@@ -136,6 +140,7 @@ impl Scheduler {
             pause: None,
             limits: Limits::default(),
             looked: None,
+            notifier,
         };
         for why in &left.warnings {
             warn!("{why}");
@@ -296,6 +301,9 @@ impl Scheduler {
         for left in leaving.collect::<Vec<_>>() {
             // A panic there would be a bug that the end of the process hides anyway.
             let _ = left.await;
+        }
+        if let Some(notifier) = self.notifier.take() {
+            tokio::task::block_in_place(|| notifier.end());
         }
     }
 
@@ -530,6 +538,10 @@ impl Scheduler {
         if let Err(why) = self.record(job, ended.clone()) {
             warn!(job, "its record is not on disk yet: {why}");
             self.unwritten.insert(job);
+        }
+        if let (Some(notifier), Some(ended), Some(entry)) = (&self.notifier, &ended, self.queue.get(job)) {
+            let folder = entry.folder.clone().filter(|folder| folder.is_dir());
+            notifier.tell(Over::of_job(job, (&entry.name, &entry.owner), state, folder, ended));
         }
         if let Some(status) = self.status.get(&job) {
             status.send_modify(|status| {

@@ -42,9 +42,7 @@ use plan::Study;
 use submitted::Submitted;
 use table::{Outcome, Outcomes};
 
-use crate::{
-    client::arguments::ClientArgs, interrupt::stop_on_interrupt, notify::notify, results::write_whole,
-};
+use crate::{client::arguments::ClientArgs, interrupt::stop_on_interrupt, results::write_whole};
 
 /// Name of the list of commands that repeat the points.
 const COMMANDS: &str = "commands.txt";
@@ -54,8 +52,9 @@ const COMMANDS: &str = "commands.txt";
 /// # Errors
 /// Faults of the study or of its deck, or whatever went wrong on the way.
 pub fn run(args: &StudyArgs) -> Result<ExitCode, String> {
+    args.notify.check()?;
     let result = compute_all(args);
-    notify(args.notify.as_deref(), &args.study.display().to_string(), Some(&args.folder()), &result);
+    args.notify.tell_of(&args.study.display().to_string(), Some(&args.folder()), &result);
     result
 }
 

@@ -1,6 +1,6 @@
 //! Runs that go well.
 
-use std::{collections::BTreeMap, fs};
+use std::{collections::BTreeMap, fs, process::Command};
 
 use tests::cluster::{Cluster, repository, said, until};
 
@@ -244,7 +244,7 @@ fn a_job_that_is_held_gives_its_workers_away_and_goes_on_where_it_was_stored() {
 #[test]
 fn a_keyword_deck_is_submitted_with_what_it_includes() {
     let deck = repository("deck/examples/block-on-plate.k").display().to_string();
-    let mut command = std::process::Command::new(BOLIDE);
+    let mut command = Command::new(BOLIDE);
     command.args(["run", &deck, "--cycles", "40", "--no-output", "--threads", "1", "--json"]);
     let alone = said(&mut command);
     let expected = digest_of(&serde_json::from_str(&alone.out).unwrap_or_else(|e| panic!("{e}: {alone:?}")));
@@ -272,7 +272,7 @@ fn a_worker_waits_for_a_master_that_is_not_there_yet_and_comes_back_to_a_new_one
     let mut cluster = Cluster::start(BOLIDE, false);
     cluster.worker("a", "1");
     cluster.master.kill();
-    let mut master = std::process::Command::new(BOLIDE);
+    let mut master = Command::new(BOLIDE);
     master.args(["master", "--listen", &cluster.address, "--spool"]).arg(cluster.folder().join("spool"));
     cluster.master = tests::cluster::Process::start("second master", &mut master);
     cluster.master.wait_for("worker a joined");
@@ -282,4 +282,43 @@ fn a_worker_waits_for_a_master_that_is_not_there_yet_and_comes_back_to_a_new_one
     );
     let summary = serde_json::from_str(&said.out).unwrap_or_else(|e| panic!("{e}: {said:?}"));
     assert_eq!(digest_of(&summary), reference());
+}
+
+/// A master tells of jobs that came to their end and of one that a user took back.
+#[test]
+fn a_master_tells_of_every_job_that_is_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let told = folder.path().join("told");
+    let words = format!("echo \"$BOLIDE_JOB $BOLIDE_STATE $BOLIDE_FOLDER\" >> {}", told.display());
+    let mut cluster = Cluster::start_with(BOLIDE, false, &["--notify", &words], None);
+    let submit = ["submit", &small(), "--cycles", "40", "--no-output"];
+    assert_eq!(cluster.json(&submit)["job"], 1);
+    assert_eq!(cluster.json(&submit[..4])["job"], 2);
+    assert_eq!(cluster.client(&["cancel", "1"]).code, Some(0));
+    cluster.worker("a", "1");
+    let expected = format!("1 stopped \n2 done {}\n", cluster.results(2).display());
+    let lines = || fs::read_to_string(&told).unwrap_or_default();
+    until(|| format!("{} in place of {expected}", lines()), || (lines() == expected).then_some(()));
+    let early = cluster.client(&["submit", &small(), "--notify", "true"]);
+    assert!(early.code == Some(1) && early.err.contains("need --wait"), "{early:?}");
+}
+
+/// The master itself is a server of TLS whose certificate is the lab's; what it is told then is no frame.
+#[test]
+fn a_webhook_goes_to_whom_this_host_trusts() {
+    let cluster = Cluster::start(BOLIDE, true);
+    let post = |ca: &str| {
+        let mut command = Command::new(BOLIDE);
+        let url = format!("https://{}/hooks/7", cluster.address);
+        command.args(["run", &small(), "--cycles", "2", "--no-output", "--webhook", &url]);
+        let ca = cluster.folder().join("certs").join(ca);
+        let told = said(command.env("SSL_CERT_FILE", ca).env_remove("SSL_CERT_DIR"));
+        assert!(told.code == Some(0) && told.err.contains("--webhook of 127.0.0.1: "), "{told:?}");
+        assert!(!told.err.contains("hooks"), "the address is a secret: {told:?}");
+        told.err
+    };
+    let words = "invalid peer certificate: UnknownIssuer";
+    assert!(post("none.pem").contains(words));
+    let trusted = post("ca.pem");
+    assert!(!trusted.contains(words), "{trusted}");
 }

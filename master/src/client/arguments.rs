@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use protocol::options::JobOptions;
 
-use crate::command::ReadingArgs;
+use crate::{command::ReadingArgs, notify::NotifyArgs};
 
 /// Where a client looks for its master.
 pub const MASTER: &str = "127.0.0.1:7117";
@@ -85,9 +85,9 @@ pub struct SubmitArgs {
     /// Follow the job until it ends, then print its summary
     #[arg(long)]
     pub wait: bool,
-    /// When it is over run this in a shell, with BOLIDE_JOB, BOLIDE_STATE (done, failed or stopped), BOLIDE_FOLDER and BOLIDE_REASON set
-    #[arg(long, value_name = "COMMAND", requires = "wait")]
-    pub notify: Option<String>,
+    /// Whom to tell when it is over; with --wait
+    #[command(flatten)]
+    pub notify: NotifyArgs,
     /// Write trace.json into the results: what every worker did in its last cycles, for Perfetto
     #[arg(long, conflicts_with = "no_output")]
     pub trace: bool,

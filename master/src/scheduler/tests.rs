@@ -8,7 +8,7 @@ const JOB: u32 = 7;
 
 fn scheduler(folder: &Path) -> Scheduler {
     let (spool, left) = Spool::open(folder).expect("a spool");
-    Scheduler::new(folder.to_owned(), spool, left, mpsc::channel(1).0, None)
+    Scheduler::new(folder.to_owned(), spool, left, mpsc::channel(1).0, None, None)
 }
 
 fn queued(wish: Option<Wish>) -> Record {

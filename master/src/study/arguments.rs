@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
+use crate::notify::NotifyArgs;
+
 /// Who computes the runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum On {
@@ -39,9 +41,9 @@ pub struct StudyArgs {
     /// Compute threads of each run on this PC [default: its cores, shared by the runs that there are]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
-    /// When it is over run this in a shell, with BOLIDE_JOB, BOLIDE_STATE (done, failed or stopped), BOLIDE_FOLDER and BOLIDE_REASON set
-    #[arg(long, value_name = "COMMAND")]
-    pub notify: Option<String>,
+    /// Whom to tell when it is over
+    #[command(flatten)]
+    pub notify: NotifyArgs,
     /// Put the runs into the queue of this master instead: HOST, HOST:PORT or [ADDRESS]:PORT
     #[arg(long, conflicts_with_all = ["runs", "threads"])]
     pub master: Option<String>,
