@@ -9,7 +9,8 @@
 //!   calls workers of jobs that have more than their part; these go at the next plan boundary of their job.
 //! - A job for which there are workers enough, but not beside those that run, has a *reservation*: jobs behind it start before it only if
 //!   they end before it could begin, or leave it enough workers. Where jobs that came after it are all that keeps it from beginning, as many of
-//!   them are stored and wait behind it.
+//!   them are stored and wait behind it. The jobs whose end it awaits give no worker to a job that can do without, and what is idle is lent
+//!   only to jobs that are dealt out quickly enough to give it back.
 //! - What is idle after that is given to those that have least of their part, as far as it helps them at all ([`HELPS`]).
 //! - Work is dealt out anew where workers change, so a job whose end is near keeps those that it has.
 //! - A job on one worker of which it uses half of the threads at most leaves the others to a job that lacks a worker; idle threads go back to
@@ -25,6 +26,7 @@ use crate::{
 pub use slots::Threads;
 use turns::in_order;
 
+mod admission;
 mod aside;
 mod calls;
 mod idle;
@@ -197,6 +199,8 @@ struct Row<'a> {
     is_in: bool,
     /// It has passed the one with the reservation, or runs and came after it.
     passes: bool,
+    /// The one with the reservation waits for its end.
+    is_awaited: bool,
     /// Its part of the speeds.
     part: f64,
     /// The speed with which it would take the time that it says it does.
@@ -243,6 +247,8 @@ struct Table<'a> {
     /// Indices of workers that are idle and not given away, the fastest first.
     idle: Vec<usize>,
     available: Option<u64>,
+    /// When the job with the reservation could begin (s).
+    begins: f64,
     done: Arrangement,
 }
 
@@ -262,6 +268,7 @@ impl<'a> Table<'a> {
             needs: claim.needs(),
             is_in: claim.runs,
             passes: false,
+            is_awaited: false,
             part: 0.0,
             told_with: 1.0,
             waits: None,
@@ -275,7 +282,14 @@ impl<'a> Table<'a> {
             let leave = (0..workers.len()).filter(leaves);
             row.told_with = row.has.iter().copied().chain(leave).map(|w| workers[w].bearer.speed).sum();
         }
-        Self { rows, workers, idle, available, done: Arrangement { threads, ..Arrangement::default() } }
+        Self {
+            rows,
+            workers,
+            idle,
+            available,
+            begins: f64::INFINITY,
+            done: Arrangement { threads, ..Arrangement::default() },
+        }
     }
 
     fn speed(&self, worker: usize) -> f64 {
@@ -325,103 +339,6 @@ impl<'a> Table<'a> {
             }
         }
         returns
-    }
-
-    /// Workers that all of the jobs that are in need.
-    fn pinned(&self) -> usize {
-        self.rows.iter().filter(|row| row.is_in).map(Row::floor).sum()
-    }
-
-    /// Says which of the waiting jobs may start beside those that run.
-    fn admit(&mut self, returns: Option<u32>) {
-        // Of the reservation: when it could begin (s), and how many workers are left over then.
-        let mut window: Option<(f64, usize)> = None;
-        for row in 0..self.rows.len() {
-            if self.rows[row].is_in || self.rows[row].waits.is_some() {
-                continue;
-            }
-            if let Some(job) = returns {
-                self.rows[row].waits = Some(format!("job {job}"));
-                continue;
-            }
-            let claim = self.rows[row].claim;
-            let needs = match self.needs(claim) {
-                Ok(needs) => needs,
-                Err(words) => {
-                    self.rows[row].waits = Some(words);
-                    continue;
-                }
-            };
-            self.rows[row].needs = needs;
-            if self.pinned() + needs <= self.workers.len() + self.spares().count() {
-                while self.pinned() + needs > self.workers.len() && self.divide() {}
-            }
-            let fits = self.pinned() + needs <= self.workers.len();
-            match &mut window {
-                None if fits => self.rows[row].is_in = true,
-                None => {
-                    let (begins, over) = if self.set_aside(row) { (0.0, 0) } else { self.window(needs) };
-                    window = Some((begins, over));
-                    self.done.reserved =
-                        Some((claim.job, if self.is_settled() { begins } else { f64::INFINITY }));
-                    for other in self.behind(row) {
-                        self.rows[other].passes = true;
-                    }
-                }
-                Some((begins, over)) if fits => {
-                    let least = self.workers.iter().map(|worker| worker.threads.max(1)).min().unwrap_or(1);
-                    let takes = claim.left_s.map_or(f64::INFINITY, |left| left / f64::from(least));
-                    let leaves_enough = takes > *begins && needs <= *over;
-                    if leaves_enough {
-                        *over -= needs;
-                    }
-                    let passes = takes <= *begins || leaves_enough;
-                    (self.rows[row].is_in, self.rows[row].passes) = (passes, passes);
-                }
-                Some(_) => {}
-            }
-        }
-    }
-
-    /// Workers that a job needs, by its options and by memory.
-    ///
-    /// # Errors
-    /// What it waits for, if all workers together are not enough.
-    fn needs(&self, claim: &Claim<'_>) -> Result<usize, String> {
-        let n = self.workers.len();
-        let needs = claim.needs();
-        if needs > n {
-            if let Some(names) = claim.before.filter(|names| !names.is_empty()) {
-                return Err(format!("its workers: 0 of {} are back", names.len()));
-            }
-            let workers = if needs == 1 { "worker" } else { "workers" };
-            return Err(format!("{needs} {workers}, {} are idle", self.idle.len()));
-        }
-        let mut fastest: Vec<usize> = (0..n).collect();
-        fastest.sort_by(|&a, &b| self.speed(b).total_cmp(&self.speed(a)));
-        let enough = (needs..=n).find(|&n| self.lack(claim, fastest[..n].iter().copied()).is_none());
-        enough.ok_or_else(|| self.lack(claim, fastest.into_iter()).unwrap_or_default())
-    }
-
-    /// When a job that needs so many workers could begin (s), if jobs end as they say, and how many are left over then.
-    fn window(&self, needs: usize) -> (f64, usize) {
-        let mut running: Vec<&Row<'_>> = self.rows.iter().filter(|row| row.is_in).collect();
-        let left = |row: &Row<'_>| row.claim.left_s.filter(|_| row.claim.runs).unwrap_or(f64::INFINITY);
-        running.sort_by(|a, b| left(a).total_cmp(&left(b)));
-        let mut free = self.workers.len() - self.pinned();
-        for row in running {
-            free += row.floor();
-            if free >= needs {
-                return (left(row), free - needs);
-            }
-        }
-        (f64::INFINITY, 0)
-    }
-
-    /// Whether each job that is in has its workers for now. While some are on their way nobody knows how long those take that they leave.
-    fn is_settled(&self) -> bool {
-        self.rows.iter().all(|row| !row.is_in || row.claim.runs)
-            && self.workers.iter().all(|worker| !matches!(worker.stands, Stands::Called { .. }))
     }
 
     /// Says which part of the speeds each job has that is in.
@@ -513,6 +430,12 @@ impl<'a> Table<'a> {
         let soonest = self.rows.iter().filter(|row| row.claim.runs);
         let soonest = soonest.filter_map(|row| row.claim.left_s.map(|left| (left, row.claim.job)));
         let soonest = soonest.min_by(|a, b| a.0.total_cmp(&b.0));
+        // A job that gives workers up ends later than it says.
+        if let Some((_, begins)) = &mut self.done.reserved
+            && !self.done.calls.is_empty()
+        {
+            *begins = f64::INFINITY;
+        }
         let mut ahead = 0;
         for row in &self.rows {
             let claim = row.claim;

@@ -6,14 +6,15 @@ use super::{Claim, Row, Table, turns::in_order};
 
 impl Table<'_> {
     /// Has jobs stored that came after the one that waits in `row`, if they alone keep it from beginning: they took longer than was
-    /// expected, or those before it ended sooner. They wait behind it and lose nothing. True if it can begin without them, or without
-    /// jobs that end soon in any case.
-    pub(super) fn set_aside(&mut self, row: usize) -> bool {
+    /// expected, or those before it ended sooner. They wait behind it and lose nothing. Gives when it can begin (s): without them, and without jobs
+    /// that end soon in any case.
+    pub(super) fn set_aside(&mut self, row: usize) -> Option<f64> {
         if !self.is_settled() {
-            return false;
+            return None;
         }
         let lacks = (self.pinned() + self.rows[row].needs).saturating_sub(self.workers.len());
         let end_soon = self.rows.iter().filter(|other| other.is_in && other.ends_soon());
+        let begins = end_soon.clone().filter_map(|other| other.claim.left_s).fold(0.0, f64::max);
         let mut freed: usize = end_soon.map(Row::floor).sum();
         let mut stores = Vec::new();
         for other in self.behind(row) {
@@ -23,10 +24,10 @@ impl Table<'_> {
             }
         }
         if freed < lacks {
-            return false;
+            return None;
         }
         self.done.stores = stores;
-        true
+        Some(begins)
     }
 
     /// Jobs that run and would have to wait behind the one in `row` if they did not, the last come first.

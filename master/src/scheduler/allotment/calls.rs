@@ -32,18 +32,19 @@ impl Table<'_> {
             let has: f64 = self.rows[row].has.iter().map(|&worker| self.speed(worker)).sum();
             has - self.rows[row].part
         };
-        // Rather than that a long job is dealt out anew, another one waits for a job that ends meanwhile.
-        let running = self.rows.iter().filter(|row| row.claim.runs && !row.has.is_empty());
-        let next_end = running.filter_map(|row| row.claim.left_s).fold(f64::INFINITY, f64::min);
+        // Rather than that a long job is dealt out anew, another one waits for jobs that end meanwhile.
+        let lacks = self.rows[to].needs.saturating_sub(self.rows[to].n()).max(1);
+        let others_end = self.ends(lacks);
         let mut from: Vec<usize> = (0..self.rows.len())
             .filter(|&row| {
                 let Row { claim, has, .. } = &self.rows[row];
                 let gives = above(row) > 0.0 || (must && claim.priority <= self.rows[to].claim.priority);
                 row != to
+                    && (must || !self.rows[row].is_awaited)
                     && claim.runs
                     && gives
                     && has.len() > self.rows[row].floor()
-                    && 2.0 * self.rows[row].deals() < next_end
+                    && 2.0 * self.rows[row].deals() < others_end
                     && !self.rows[row].ends_soon()
             })
             .collect();
@@ -65,11 +66,25 @@ impl Table<'_> {
             .or_else(|| if must { of(&|_, _| true, false) } else { None })
     }
 
+    /// When so many workers are idle because their jobs have ended (s).
+    fn ends(&self, workers: usize) -> f64 {
+        let running = self.rows.iter().filter(|row| row.claim.runs);
+        let mut ends: Vec<(f64, usize)> =
+            running.filter_map(|row| Some((row.claim.left_s?, row.has.len()))).collect();
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut idle = 0;
+        let enough = ends.into_iter().find(|(_, has)| {
+            idle += has;
+            idle >= workers
+        });
+        enough.map_or(f64::INFINITY, |(left, _)| left)
+    }
+
     /// Has jobs that have much less than their part call workers of those that have more.
     pub(super) fn even_out(&mut self) {
         for row in 0..self.rows.len() {
             let Row { claim, coming, part, .. } = &self.rows[row];
-            if claim.runs && coming.is_empty() && self.rows[row].is_worth_changing() {
+            if claim.runs && coming.is_empty() && self.rows[row].is_worth_changing() && self.may_borrow(row) {
                 let has = self.speed_of(row);
                 if has < SHORT_OF_ITS_PART * part {
                     self.call(row);

@@ -2,6 +2,9 @@
 
 use super::{Call, FASTER, HELPS, Row, SLACK, Table};
 
+/// A worker is lent to a job until a reservation if that is as many times away as dealing the job out takes.
+const LENT: f64 = 4.0;
+
 impl Table<'_> {
     /// Gives idle workers to the jobs that have least of their part, as far as they fit into it.
     pub(super) fn fill(&mut self) {
@@ -72,11 +75,17 @@ impl Table<'_> {
         let Row { claim, given, needs, is_in, .. } = &self.rows[row];
         let n = self.rows[row].n();
         *is_in
+            && (n == 0 || self.may_borrow(row))
             && (claim.runs || given.len() >= *needs)
             // One whose workers are all lost waits for any.
             && (n == 0 || !self.rows[row].ends_soon())
             && n < claim.workers[1]
             && self.shortage(claim, self.rows[row].all().chain([worker])).is_none()
+    }
+
+    /// Whether the job with the reservation begins so late that a worker more is worth dealing this one out anew, twice.
+    pub(super) fn may_borrow(&self, row: usize) -> bool {
+        LENT * self.rows[row].deals() < self.begins
     }
 
     /// Whether a job is faster with one more worker.
