@@ -43,7 +43,7 @@ needs=$($mingw-objdump -p "$exe" | sed -n 's/.*DLL Name: //p')
 for library in $needs; do
     case ${library,,} in
         kernel32.dll | ntdll.dll | msvcrt.dll | advapi32.dll | bcrypt.dll | bcryptprimitives.dll | ws2_32.dll | iphlpapi.dll | \
-            userenv.dll | user32.dll | shell32.dll | ole32.dll | oleaut32.dll | secur32.dll | crypt32.dll | psapi.dll | \
+            userenv.dll | user32.dll | shell32.dll | ole32.dll | oleaut32.dll | secur32.dll | crypt32.dll | ncrypt.dll | psapi.dll | \
             api-ms-win-*) ;;
         *) echo "build.sh: bolide.exe needs $library, which Windows does not have" >&2; exit 1 ;;
     esac
@@ -54,4 +54,7 @@ zip -q -j "$packed" "$exe" deploy/windows/README.md LICENSE-MIT LICENSE-APACHE |
 echo "$packed: $(stat -c %s "$packed") bytes"
 
 command -v /usr/lib/wine/wine64 >/dev/null || { echo "build.sh: no wine; no test was run" >&2; exit 3; }
-cargo test --release --locked -p system -p mechanics -p deck --lib --target $triple "${std[@]}" || exit 1
+cargo test --release --locked -p mechanics -p deck -p protocol -p worker --lib --target $triple "${std[@]}" || exit 1
+# Wine 8 says of no socket whose it is, and keeps no list of who may read a file.
+cargo test --release --locked -p system --lib --target $triple "${std[@]}" -- --skip windows_lists_the_sockets \
+    --skip lets_nobody_else_read || exit 1
