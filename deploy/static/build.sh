@@ -1,8 +1,8 @@
 #!/bin/bash
 # Builds a static binary (target x86_64-unknown-linux-musl), and compares it with the one that is linked dynamically.
 #
-# usage: deploy/static/build.sh [DYNAMIC]     (default: target/release/bolide; compared with, if it is there)
-#        needs: rustup target add x86_64-unknown-linux-musl, and musl-gcc (Debian: musl-tools)
+# usage: deploy/static/build.sh [--install] [DYNAMIC]     (default: target/release/bolide; compared with, if it is there)
+#        --install gets what it needs: musl-gcc from Debian (musl-tools; root), the target from rustup
 #
 # environment: CARGO_TARGET_DIR  where it is built [default: target]
 #              ROUNDS            of the comparison, paired [default: 5]
@@ -12,12 +12,17 @@ set -u
 cd "$(dirname "$0")/../.." || exit 1
 triple=x86_64-unknown-linux-musl
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
+if [ "${1:-}" = --install ]; then
+    shift
+    apt-get update -q && apt-get install -y -q --no-install-recommends musl-tools || exit 3
+    rustup target add $triple || exit 3
+fi
 if ! command -v musl-gcc >/dev/null; then
-    echo "build.sh: no musl-gcc (Debian: musl-tools); nothing was built" >&2
+    echo "build.sh: no musl-gcc; deploy/static/build.sh --install gets it (root); nothing was built" >&2
     exit 3
 fi
 if ! [ -d "$(rustc --print sysroot)/lib/rustlib/$triple" ]; then
-    echo "build.sh: rustup target add $triple; nothing was built" >&2
+    echo "build.sh: no compiler for $triple; deploy/static/build.sh --install gets it; nothing was built" >&2
     exit 3
 fi
 cargo build --release --locked -p master --target $triple || exit 1
