@@ -262,9 +262,6 @@ fn line_of(status: &Status) -> String {
 /// Faults of the deck, or whatever went wrong on the way.
 pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     args.notify.check()?;
-    if args.notify.is_some() && !args.wait {
-        return Err("--notify, --webhook and --mail of `submit` need --wait; `bolide master --webhook URL` tells of every job".to_owned());
-    }
     let name = args.deck.display().to_string();
     let text = gather_deck(&args.deck, &args.reading.options())?;
     // The master answers with faults; what a run does otherwise than the deck says is told here.

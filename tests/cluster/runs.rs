@@ -300,7 +300,7 @@ fn a_master_tells_of_every_job_that_is_over() {
     let lines = || fs::read_to_string(&told).unwrap_or_default();
     until(|| format!("{} in place of {expected}", lines()), || (lines() == expected).then_some(()));
     let early = cluster.client(&["submit", &small(), "--notify", "true"]);
-    assert!(early.code == Some(1) && early.err.contains("need --wait"), "{early:?}");
+    assert!(early.code == Some(2) && early.err.contains("--wait"), "{early:?}");
 }
 
 /// The master itself is a server of TLS whose certificate is the lab's; what it is told then is no frame.

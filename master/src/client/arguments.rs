@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use protocol::options::JobOptions;
 
 use crate::{command::ReadingArgs, notify::NotifyArgs};
@@ -49,6 +49,7 @@ fn workers(text: &str) -> Result<[u32; 2], String> {
 
 /// Flags of `submit`.
 #[derive(Args, Clone, Debug)]
+#[command(group(ArgGroup::new("told").args(["notify", "webhook", "mail"]).multiple(true).requires("wait")))]
 pub struct SubmitArgs {
     /// The deck (TOML, or LS-DYNA keywords); files that it refers to are sent along
     pub deck: PathBuf,

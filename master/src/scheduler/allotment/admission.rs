@@ -36,14 +36,14 @@ impl Table<'_> {
             match &mut window {
                 None if fits => self.rows[row].is_in = true,
                 None => {
-                    let (begins, over) = match self.set_aside(row) {
+                    self.begins = if let Some(begins) = self.set_aside(row) {
                         // Nobody passes one for which others were stored.
-                        Some(begins) => (begins, None),
-                        None => self.window(needs),
+                        window = Some((0.0, 0));
+                        begins
+                    } else {
+                        window.insert(self.window(needs)).0
                     };
-                    window = Some(over.map_or((0.0, 0), |over| (begins, over)));
-                    self.begins = begins;
-                    let told = if self.is_settled() { begins + self.collects() } else { f64::INFINITY };
+                    let told = if self.is_settled() { self.begins + self.collects() } else { f64::INFINITY };
                     self.done.reserved = Some((claim.job, told));
                     for other in self.behind(row) {
                         self.rows[other].passes = true;
@@ -85,7 +85,7 @@ impl Table<'_> {
     }
 
     /// When a job that needs so many workers could begin (s), if jobs end as they say, and how many are left over then.
-    fn window(&mut self, needs: usize) -> (f64, Option<usize>) {
+    fn window(&mut self, needs: usize) -> (f64, usize) {
         let mut running: Vec<&mut Row<'_>> = self.rows.iter_mut().filter(|row| row.is_in).collect();
         let left = |row: &Row<'_>| row.claim.left_s.filter(|_| row.claim.runs).unwrap_or(f64::INFINITY);
         running.sort_by(|a, b| left(a).total_cmp(&left(b)));
@@ -94,10 +94,10 @@ impl Table<'_> {
             free += row.floor();
             row.is_awaited = true;
             if free >= needs {
-                return (left(row), Some(free - needs));
+                return (left(row), free - needs);
             }
         }
-        (f64::INFINITY, Some(0))
+        (f64::INFINITY, 0)
     }
 
     /// How long workers take to come that are lent to jobs until a reservation (s): to a plan boundary, and until what is being dealt out
