@@ -248,6 +248,21 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
         assert_eq!(std::fs::read(&path).ok(), std::fs::read(&other).ok(), "{}", path.display());
     }
 
+    // A block of the checkpoint is computed a third time, by the browser, where the binary has the module for that.
+    let offered = browser.evaluate("!document.getElementById('again-box').hidden");
+    assert_eq!(offered, cfg!(has_recompute), "deploy/wasm/build.sh builds the module");
+    if cfg!(has_recompute) {
+        browser.evaluate("document.getElementById('again-run').click()");
+        let verdict = browser.wait_for(
+            "!document.getElementById('again-run').disabled && document.getElementById('again-verdict').textContent",
+        );
+        assert_eq!(verdict, "the same bits");
+        let hashes =
+            browser.evaluate("[...document.querySelectorAll('#again-hashes code')].map(e => e.textContent)");
+        assert_eq!(hashes[0].as_str().map(str::len), Some(32));
+        assert_eq!(hashes[0], hashes[1]);
+    }
+
     // No wider than a small screen, on which the job comes first.
     browser.picture(400, 900, true);
     assert_eq!(browser.evaluate("document.documentElement.scrollWidth"), 400);

@@ -1,5 +1,6 @@
 // The page: hears the overview as a stream, asks for the chosen job's sheet, and hands both to what draws.
 
+import * as again from './again.js';
 import { ask, json, root } from './ask.js';
 import * as deck from './deck.js';
 import * as energies from './energies.js';
@@ -149,6 +150,7 @@ const ended = () => outcome.draw(page.chosen, page.beside?.job, page.sheet);
 function panels() {
   const { workers, phases } = page.sheet;
   energies.draw(page.sheet);
+  again.offer(page.chosen, page.overview.recomputes && page.sheet.proved);
   $('phases').closest('section').hidden = !phases.length;
   if (!phases.length) return;
   timeline.draw($('phases'), workers, phases);

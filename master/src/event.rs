@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mechanics::{contact::Census, state::GlobalState};
+use mechanics::{contact::Census, sample::Sample, state::GlobalState};
 use protocol::{
     message::{ToMaster, ToWorker, Work},
     phase::Report,
@@ -94,10 +94,24 @@ pub enum Action {
     /// Have no more to do with a worker, and tell it why: it failed by itself, or its numbers are wrong. The job has gone on
     /// without it, and it must not come back.
     Dismiss(usize, String),
+    /// A worker's sample agreed with what it came to here; another may compute it a third time.
+    Proved(Box<Proved>),
     /// Tell the user how far it is.
     Progress(Progress),
     /// The job is over.
     Over(Box<Outcome>),
+}
+
+/// A worker's sample that was computed again and agreed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proved {
+    /// Name of the worker.
+    pub worker: String,
+    /// Name of the part whose block it is.
+    pub part: String,
+    /// What the elements came to.
+    pub hash: [u8; 16],
+    pub sample: Sample,
 }
 
 /// What a worker was dealt.

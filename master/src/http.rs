@@ -65,8 +65,8 @@ const HEADER_BYTES: usize = 16 << 10;
 const IDLE_LIMIT: Duration = Duration::from_secs(60);
 /// The longest that the owner of the queue may take to say that it is well.
 const HEALTH_LIMIT: Duration = Duration::from_secs(2);
-/// What pages may load: their own files and nothing else.
-const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+/// What pages may load: their own files and nothing else, the module that computes a block again among them.
+const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
 /// Where the page listens and by which certificate.
 pub struct Place {

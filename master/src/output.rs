@@ -318,6 +318,7 @@ impl Sink for Output {
             | Action::Dealt(_)
             | Action::Dismiss(..)
             | Action::Freed(..)
+            | Action::Proved(_)
             | Action::Over(_) => Ok(()),
         }
     }

@@ -290,6 +290,7 @@ impl Reporter<'_> {
             Action::Row(row) => job_view.row(row),
             Action::State(state) => job_view.state(self.model, state),
             Action::Dealt(deals) => job_view.dealt(deals),
+            Action::Proved(proved) => job_view.proved(proved),
             Action::Rewind { cycle, .. } => job_view.rewind(*cycle),
             Action::Progress(progress) => job_view.progress(progress),
             _ => {}

@@ -1,6 +1,6 @@
 //! How values become payloads: control messages, packed arrays, and large messages in chunks.
 //!
-//! This is the only module that knows bincode (fixed-size little-endian integers, always with a limit).
+//! This is the only module that knows bincode, but for the crate `recompute` (fixed-size little-endian integers, always with a limit).
 //! Rules for message types that pass through here: no container whose elements take no bytes (a length
 //! of 2^60 would then cost that many steps), no recursive types, no `char`; floating-point fields carry
 //! `#[serde(deserialize_with = "crate::codec::finite")]` or are checked with [`check_finite`].

@@ -2,7 +2,7 @@
 //!
 //! | request | answer |
 //! |---|---|
-//! | `GET /api/overview` | `{version, join, jobs, hosts}`; a job is a status with `brief` once it runs |
+//! | `GET /api/overview` | `{version, join, jobs, hosts, recomputes}`; a job is a status with `brief` once it runs |
 //! | `GET /api/events` | the same as server-sent events, whenever it changes, at most twice a second |
 //! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N&max_workers=N`, body the deck | `{job}`; 422 `{faults: [{file, line, column, ...}]}` |
 //! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes, forecast}`, or 422 as above |
@@ -11,6 +11,7 @@
 //! | `GET /api/jobs/N` | the job's status |
 //! | `GET /api/jobs/N/sheet` | energies, imbalance, phases of workers, list of states |
 //! | `GET /api/jobs/N/surface/K?cut=AXIS&at=SHARE&side=SIDE&hide=PARTS` | the surface of state K, binary, as [`surface`](super::surface) says; with a cut, of the elements on one side (`beyond` or `below`) of a plane; without the parts of these indices |
+//! | `GET /api/jobs/N/sample` | a block of the newest checkpoint, binary, for the module `recompute.wasm`; the sheet says of it `proved` |
 //! | `GET /api/jobs/N/history` | `{columns}` of the history; `?columns=3,7` adds `{values}`, a list for each, thinned |
 //! | `GET /api/jobs/N/files` | `[{name, bytes}]` of its results |
 //! | `GET /api/jobs/N/files/NAME` | the file |
@@ -39,7 +40,7 @@ use tokio_stream::wrappers::ReceiverStream;
 
 use super::{
     api_state::ApiState,
-    board, files,
+    assets, board, files,
     folder::{self, At, View},
 };
 use crate::{
@@ -68,6 +69,7 @@ pub fn routes() -> Router<ApiState> {
         .route("/jobs/{job}/resume", post(resume))
         .route("/jobs/{job}/sheet", get(job_view))
         .route("/jobs/{job}/surface/{index}", get(surface))
+        .route("/jobs/{job}/sample", get(sample))
         .route("/jobs/{job}/history", get(files::history))
         .route("/jobs/{job}/files", get(files::list))
         .route("/jobs/{job}/files/{name}", get(files::file))
@@ -127,7 +129,10 @@ async fn all(api_state: &ApiState) -> Result<serde_json::Value, notice::Error> {
     };
     let hosts: Vec<_> = hosts.into_iter().map(host).collect();
     let (version, join, shows) = (env!("CARGO_PKG_VERSION"), &api_state.join, api_state.only_shows);
-    Ok(json!({ "version": version, "join": join, "jobs": jobs, "hosts": hosts, "only_shows": shows }))
+    let recomputes = assets::recomputes();
+    Ok(
+        json!({ "version": version, "join": join, "jobs": jobs, "hosts": hosts, "only_shows": shows, "recomputes": recomputes }),
+    )
 }
 
 async fn overview(State(api_state): State<ApiState>) -> Result<Json<serde_json::Value>, Fault> {
@@ -285,6 +290,17 @@ async fn job_view(
     }
     let folder = folder_of(&api_state, job).await?;
     files::blocking(move || folder::sheet(&folder)).await.map(Json)
+}
+
+/// `GET /api/jobs/N/sample`.
+async fn sample(State(api_state): State<ApiState>, Path(job): Path<u32>) -> Result<impl IntoResponse, Fault> {
+    let proved = api_state.board.job_view(job).and_then(|job_view| board::lock(&job_view).newest_proved());
+    let none = || {
+        format!("job {job} has no block to compute again: it has not begun, or this master has forgotten it")
+    };
+    let proved = proved.ok_or_else(|| missing(none()))?;
+    let bytes = files::blocking(move || recompute::write(&proved.sample)).await?;
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], bytes))
 }
 
 /// Where the results of a job are.

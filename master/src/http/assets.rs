@@ -10,7 +10,7 @@ const PAGE: &str = include_str!("../../page/index.html");
 const JS: &str = "text/javascript; charset=utf-8";
 
 /// Path, type and text of every other file.
-const FILES: [(&str, &str, &str); 17] = [
+const FILES: [(&str, &str, &str); 19] = [
     ("/style.css", "text/css; charset=utf-8", include_str!("../../page/style.css")),
     ("/main.js", JS, include_str!("../../page/main.js")),
     ("/ask.js", JS, include_str!("../../page/ask.js")),
@@ -27,8 +27,16 @@ const FILES: [(&str, &str, &str); 17] = [
     ("/bodies.js", JS, include_str!("../../page/bodies.js")),
     ("/view.js", JS, include_str!("../../page/view.js")),
     ("/outcome.js", JS, include_str!("../../page/outcome.js")),
+    ("/again.js", JS, include_str!("../../page/again.js")),
+    ("/recompute.mjs", JS, include_str!("../../page/recompute.mjs")),
     ("/icon.svg", "image/svg+xml", include_str!("../../page/icon.svg")),
 ];
+
+/// The module that computes a block again, see the crate `recompute`; a build can be without it.
+#[cfg(has_recompute)]
+const MODULE: Option<&[u8]> = Some(include_bytes!(env!("BOLIDE_RECOMPUTE")));
+#[cfg(not(has_recompute))]
+const MODULE: Option<&[u8]> = None;
 
 /// The page itself.
 pub async fn page() -> impl axum::response::IntoResponse {
@@ -41,7 +49,19 @@ pub async fn page_of_a_job() -> impl axum::response::IntoResponse {
 }
 
 pub fn routes() -> Router<ApiState> {
-    FILES.iter().fold(Router::new().route("/", get(page)), |router, &(path, kind, text)| {
+    let files = FILES.iter().fold(Router::new().route("/", get(page)), |router, &(path, kind, text)| {
         router.route(path, get(move || async move { ([(header::CONTENT_TYPE, kind)], text) }))
-    })
+    });
+    match MODULE {
+        Some(module) => files.route(
+            "/recompute.wasm",
+            get(move || async move { ([(header::CONTENT_TYPE, "application/wasm")], module) }),
+        ),
+        None => files,
+    }
+}
+
+/// Whether the page offers to compute a block again.
+pub const fn recomputes() -> bool {
+    MODULE.is_some()
 }

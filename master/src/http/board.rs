@@ -14,12 +14,13 @@ use mechanics::state::GlobalState;
 use protocol::{
     message::{ToMaster, Work},
     phase::{Phase, Report},
+    token::hex,
 };
 use serde::Serialize;
 
 use super::surface::Skin;
 use crate::{
-    event::{Deal, Progress},
+    event::{Deal, Progress, Proved},
     results::{Units, history::HistoryRow},
 };
 
@@ -158,6 +159,8 @@ pub struct JobView {
     /// Planes of symmetry.
     mirrors: [bool; 3],
     states: Vec<Kept>,
+    /// The newest sample that agreed, to be computed a third time by who asks for it.
+    proved: Option<Arc<Proved>>,
 }
 
 impl JobView {
@@ -178,6 +181,7 @@ impl JobView {
             skin: Skin::new(model),
             mirrors: model.output.mirrors,
             states: Vec::new(),
+            proved: None,
         }
     }
 
@@ -232,6 +236,16 @@ impl JobView {
             let worker = self.workers.entry(deal.name.clone()).or_default();
             (worker.elements, worker.speed) = (deal.elements, deal.speed);
         }
+    }
+
+    /// A worker's sample agreed with what it came to here.
+    pub fn proved(&mut self, proved: &Proved) {
+        self.proved = Some(Arc::new(proved.clone()));
+    }
+
+    /// The newest sample that agreed.
+    pub fn newest_proved(&self) -> Option<Arc<Proved>> {
+        self.proved.clone()
     }
 
     /// The run goes back to a cycle.
@@ -342,6 +356,10 @@ impl JobView {
             "states": states,
             "parts": parts,
             "mirrors": self.mirrors,
+            "proved": self.proved.as_ref().map(|proved| serde_json::json!({
+                "worker": proved.worker, "part": proved.part, "cycle": proved.sample.cycle,
+                "elements": proved.sample.piece.elements.len(), "hash": hex(&proved.hash),
+            })),
         })
     }
 }

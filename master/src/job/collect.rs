@@ -12,7 +12,7 @@ use super::{
     samples::{Moment, Stopped},
     worker_states::Collected,
 };
-use crate::event::Action;
+use crate::event::{Action, Proved};
 
 impl Job {
     /// All states of a cycle are here.
@@ -106,8 +106,10 @@ impl Job {
         };
         let wrong = self.epoch.samples.differing(&self.problem, state, moment)?;
         let agree = wrong.is_empty();
-        if !agree {
-            self.expel(wrong, actions)?;
+        if agree {
+            self.tell_proved(actions)
+        } else {
+            self.expel(wrong, actions)?
         }
         Ok(agree)
     }
@@ -123,7 +125,19 @@ impl Job {
         };
         let moment = Moment { dt_previous, quantum: now.quantum, time };
         let wrong = self.epoch.samples.differing(&self.problem, &stopped.state, moment)?;
-        if wrong.is_empty() { self.all_stopped(stopped, actions) } else { self.expel(wrong, actions) }
+        if !wrong.is_empty() {
+            return self.expel(wrong, actions);
+        }
+        self.tell_proved(actions);
+        self.all_stopped(stopped, actions)
+    }
+
+    /// Gives one of the samples that agreed to whoever wants to compute it as well.
+    fn tell_proved(&mut self, actions: &mut Vec<Action>) {
+        let Some((position, hash, sample)) = self.epoch.samples.take_proved() else { return };
+        let worker = self.workers.spec(self.epoch.at_work[position]).name.clone();
+        let part = self.problem.model.mesh.parts[sample.piece.part as usize].name.clone();
+        actions.push(Action::Proved(Box::new(Proved { worker, part, hash, sample })));
     }
 
     /// What a checkpoint at the start of a cycle holds beside the state, once the cycle before is booked with this vote.

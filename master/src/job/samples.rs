@@ -12,15 +12,14 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
-    cycle::{Domain, Sets, Subdomain},
     exact::{Quanta, Quantum},
     lanes::Width,
     piece::{self, Piece, Region},
+    sample::Sample,
     state::GlobalState,
     vote::Vote,
 };
 use protocol::{message::sampled_block, token::hex};
-use worker::compute::ThreadClock;
 
 use super::{
     error::{Breach, Error, Sent},
@@ -55,6 +54,8 @@ pub(super) struct Samples {
     arrived: BTreeMap<u64, Vec<Option<[u8; 16]>>>,
     /// What waits for the samples of the stop.
     stopped: Option<Stopped>,
+    /// One of those that agreed last: its worker, its hash.
+    proved: Option<(usize, [u8; 16], Sample)>,
 }
 
 impl Samples {
@@ -95,6 +96,11 @@ impl Samples {
         if self.are_all_here(cycle) { self.stopped.take() } else { None }
     }
 
+    /// One of the samples that agreed last, if it was not taken yet: its worker, its hash.
+    pub(super) fn take_proved(&mut self) -> Option<(usize, [u8; 16], Sample)> {
+        self.proved.take()
+    }
+
     /// The workers whose samples of the state's cycle are others than here, and how.
     ///
     /// # Errors
@@ -109,13 +115,20 @@ impl Samples {
         let samples = self.arrived.remove(&cycle).unwrap_or_default();
         let mesh = &problem.model.mesh;
         let mut wrong = Vec::new();
+        // Workers take turns.
+        let workers = self.blocks.len();
+        let shown = sampled_block(cycle, workers.max(1));
         for (worker, theirs) in samples.into_iter().enumerate() {
             let blocks = &self.blocks[worker];
             let block = sampled_block(cycle, blocks.len());
             let Some((part, region)) = blocks.get(block) else { continue };
-            let pieces = vec![piece::cut(mesh, state, *part, region)];
-            let ours = replay(problem, (pieces, cycle), moment)?;
+            let piece = piece::cut(mesh, state, *part, region);
             let theirs = theirs.unwrap_or_default();
+            let sample = sample(problem, piece, cycle, moment);
+            if worker == shown {
+                self.proved = Some((worker, theirs, sample.clone()));
+            }
+            let ours = sample.hash(Width::best()).map_err(Error::Problem)?;
             if ours != theirs {
                 let why = format!(
                     "block {block} of {} (part `{}`) came to {} in cycle {cycle}, computed again to {}; its processor does \
@@ -128,7 +141,9 @@ impl Samples {
                 wrong.push((worker, why));
             }
         }
-        let workers = self.blocks.len();
+        if !wrong.is_empty() {
+            self.proved = None;
+        }
         match wrong.first() {
             Some((_, first)) if workers > 1 && wrong.len() == workers => {
                 Err(Error::AllDiffer { workers, first: first.clone() })
@@ -138,18 +153,12 @@ impl Samples {
     }
 }
 
-/// Hash of what the elements of a block come to in a cycle.
-fn replay(problem: &Problem, (pieces, cycle): (Vec<Piece>, u64), moment: Moment) -> Result<[u8; 16], Error> {
+/// A block at the start of a cycle, with all that its elements depend on.
+fn sample(problem: &Problem, piece: Piece, cycle: u64, moment: Moment) -> Sample {
     let Moment { dt_previous, quantum, time } = moment;
-    let subdomain = Subdomain { id: 0, pieces, unowned: Vec::new(), surface: Vec::new() };
     let quanta = Quanta { force: quantum, ..problem.quanta };
     let (setup, n_parts) = (problem.model.setup.clone(), problem.model.mesh.parts.len());
-    let mut domain = Domain::new(setup, n_parts, quanta, (vec![subdomain], cycle), &[], Width::best());
-    let clock = ThreadClock::default();
-    domain.begin(quantum, time);
-    domain.contact(dt_previous, &clock);
-    domain.elements(Sets::All, dt_previous, &clock);
-    domain.sample(0).map_err(Error::Problem)
+    Sample { setup, n_parts, quanta, piece, cycle, time, dt_previous }
 }
 
 #[cfg(test)]
@@ -170,7 +179,7 @@ mod tests {
         let of_part = |part| {
             let region = Region::Cells { low: [0; 3], high: [2; 3] };
             let piece = piece::cut(&job.problem.model.mesh, state, part, &region);
-            replay(&job.problem, (vec![piece], 0), moment).expect("it computes")
+            sample(&job.problem, piece, 0, moment).hash(Width::Scalar).expect("it computes")
         };
         let right = [of_part(0), of_part(1)];
         let differing = |hashes: [[u8; 16]; 2]| {

@@ -40,7 +40,7 @@ pub use assembly::Subdomain;
 use bodies::{Bodies, Held};
 use ghosts::Ghosts;
 use held_block::{HeldBlock, Order};
-pub use meter::Meter;
+pub use meter::{Meter, Unmeasured};
 pub use plan::{Ghost, Neighbour, Plan};
 use sharing::{Exchange, Groups, Holders, Numbers};
 use touch::HeldContact;

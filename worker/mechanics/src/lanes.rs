@@ -22,6 +22,7 @@ pub mod functions;
 #[cfg(target_arch = "aarch64")]
 pub(crate) mod neon;
 pub mod scalar;
+#[cfg(any(test, target_arch = "x86_64", target_arch = "aarch64"))]
 pub(crate) mod twice;
 
 /// Slots in a lane set: the grouping of elements is the same on every width, and the widest holds 8.

@@ -48,6 +48,7 @@ pub mod nodes;
 pub mod piece;
 pub mod proof;
 pub mod rigid;
+pub mod sample;
 pub mod setup;
 pub(crate) mod spin;
 pub mod state;

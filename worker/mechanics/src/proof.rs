@@ -8,7 +8,7 @@ use crate::{
     block::Block,
     constraint::Constraint,
     contact::{Batch, BatchFace, BatchNode, BatchUnit, Contact, Settings},
-    cycle::{self, Domain, Interval, Meter, Subdomain},
+    cycle::{self, Domain, Interval, Unmeasured},
     element::{ElementVote, hex8},
     erosion::Erosion,
     exact::{Quanta, Quantum},
@@ -17,6 +17,7 @@ use crate::{
     material::{CowperSymonds, Eos, Failure, Hardening, Heat, MAX_HARDENING, Material, Strength},
     mesh::{MAX_NODES, Part, Topology},
     piece::Piece,
+    sample::Sample,
     setup::{Control, Setup},
     state::{N_FIELDS, ShellState, field},
 };
@@ -97,17 +98,6 @@ impl Draws {
     fn about(&mut self, width: f64) -> f64 {
         width * (self.next() - 0.5)
     }
-}
-
-/// Nobody measures this.
-struct Unmeasured;
-
-impl Meter for Unmeasured {
-    fn start(&self) -> u64 {
-        0
-    }
-
-    fn stop(&self, _: u64, _: bool) {}
 }
 
 fn of_functions(hasher: &mut blake3::Hasher) {
@@ -249,9 +239,17 @@ fn stirred(material: &Material, seed: u64) -> Piece {
     }
 }
 
-/// Three cycles of a block whose nodes are free.
-fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3::Hasher) {
-    const DT: f64 = 2e-7;
+/// Time step of the problem.
+const DT: f64 = 2e-7;
+
+/// The first block of the problem, for tests of what passes samples on.
+#[doc(hidden)]
+pub fn sample() -> Sample {
+    start(materials().remove(0), 1)
+}
+
+/// A block whose nodes are free, at the start of the first cycle.
+fn start(material: Material, seed: u64) -> Sample {
     let piece = stirred(&material, seed);
     let control = Control {
         end_time: 1.0,
@@ -279,10 +277,16 @@ fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3:
     };
     let (force, energy) = (Quantum::for_reference(3e7, 42), Quantum::for_reference(1e6, 42));
     let quanta = Quanta { force, energy, momentum: energy, arm: 1.0 };
-    let subdomain = Subdomain { id: 0, pieces: vec![piece], unowned: Vec::new(), surface: Vec::new() };
-    let mut domain = Domain::new(setup, 1, quanta, (vec![subdomain], 0), &[], width);
+    Sample { setup, n_parts: 1, quanta, piece, cycle: 0, time: 0.0, dt_previous: DT }
+}
+
+/// Three cycles of a block.
+fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3::Hasher) {
+    let sample = start(material, seed);
+    let quantum = sample.quanta.force;
+    let mut domain = sample.into_domain(width);
     for n in 0..3 {
-        let now = Interval { time: DT * f64::from(n), dt_previous: DT, dt: DT, quantum: force };
+        let now = Interval { time: DT * f64::from(n), dt_previous: DT, dt: DT, quantum };
         let hashed = |domain: &Domain, partials| {
             hasher.update(&domain.sample(0).expect("there is one block"));
             partials

@@ -53,6 +53,10 @@ impl Width {
     ///
     /// # Panics
     /// If this is [`Width::Scalar`] or the machine lacks it.
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", target_arch = "aarch64")),
+        expect(unused_variables, reason = "one lane alone")
+    )]
     pub(crate) fn run_wide<T: Task>(self, task: T) -> T::Output {
         assert!(self.available(), "lane width {self} is not on this machine");
         match self {
