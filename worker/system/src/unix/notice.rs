@@ -1,15 +1,11 @@
 //! What a service manager is told: a datagram to the socket that `NOTIFY_SOCKET` names (`sd_notify` of systemd).
 
+#[cfg(target_os = "linux")]
+use std::os::{linux::net::SocketAddrExt, unix::ffi::OsStrExt};
 use std::{
     ffi::{OsStr, OsString},
     io,
-    os::{
-        linux::net::SocketAddrExt,
-        unix::{
-            ffi::OsStrExt,
-            net::{SocketAddr, UnixDatagram},
-        },
-    },
+    os::unix::net::{SocketAddr, UnixDatagram},
 };
 
 /// Sends lines `KEY=value` to the socket `name`: a path, or an abstract name after `@`. A manager that does not read loses
@@ -18,16 +14,21 @@ use std::{
 /// # Errors
 /// If nobody listens there.
 pub fn send(name: &OsStr, state: &str) -> io::Result<()> {
-    let address = match name.as_bytes() {
-        [b'@', rest @ ..] => SocketAddr::from_abstract_name(rest)?,
-        _ => SocketAddr::from_pathname(OsString::from(name))?,
-    };
+    let address = address(name)?;
     let socket = UnixDatagram::unbound()?;
     socket.set_nonblocking(true)?;
     socket.send_to_addr(state.as_bytes(), &address).map(|_| ())
 }
 
-#[cfg(test)]
+fn address(name: &OsStr) -> io::Result<SocketAddr> {
+    #[cfg(target_os = "linux")]
+    if let [b'@', rest @ ..] = name.as_bytes() {
+        return SocketAddr::from_abstract_name(rest);
+    }
+    SocketAddr::from_pathname(OsString::from(name))
+}
+
+#[cfg(all(test, target_os = "linux"))]
 mod tests {
     use super::*;
 

@@ -2,17 +2,18 @@
 
 use std::{collections::HashSet, fs, io, path::Path};
 
-use rustix::thread::{CpuSet, gettid, sched_getaffinity, sched_setaffinity};
+#[cfg(target_os = "linux")]
+use linux::{allowed, confine, lower_thread};
+#[cfg(not(target_os = "linux"))]
+use other::{allowed, confine, lower_thread};
 
-/// The highest nice value of Linux.
-const LOWEST: i32 = 19;
 /// The one of a program that steps back for others.
 const LOW: i32 = 10;
 
 /// Gives the calling thread the lowest priority of the machine's ordinary ones, for good: it runs on what others leave
 /// idle. A machine that refuses leaves it as it was.
 pub fn lowest_priority() {
-    let _ = rustix::process::setpriority_process(Some(gettid()), LOWEST);
+    lower_thread();
 }
 
 /// Gives this process, before it starts threads, a priority at which it gets a tenth of a processor that another program wants, and all of one that
@@ -33,16 +34,12 @@ pub fn low_priority_of_process() {
 /// # Errors
 /// If the machine has none of them, or refuses.
 pub fn pin(processors: &[usize]) -> io::Result<()> {
-    let mut set = CpuSet::new();
-    processors.iter().filter(|n| **n < CpuSet::MAX_CPU).for_each(|&n| set.set(n));
-    Ok(sched_setaffinity(None, &set)?)
+    confine(processors)
 }
 
 /// Number of cores that this process may use, however many processors each has; none if the machine does not say.
 pub fn n_cores() -> Option<usize> {
-    let allowed = sched_getaffinity(None).ok()?;
-    let allowed: Vec<usize> = (0..CpuSet::MAX_CPU).filter(|&n| allowed.is_set(n)).collect();
-    cores_among(&allowed, Path::new("/sys/devices/system/cpu"))
+    cores_among(&allowed()?, Path::new("/sys/devices/system/cpu"))
 }
 
 /// Number of cores that processors belong to; none if one of them does not say.
@@ -50,6 +47,50 @@ fn cores_among(processors: &[usize], folder: &Path) -> Option<usize> {
     let siblings =
         |n: &usize| fs::read_to_string(folder.join(format!("cpu{n}/topology/thread_siblings_list"))).ok();
     Some(processors.iter().map(siblings).collect::<Option<HashSet<String>>>()?.len())
+}
+
+/// What Linux does for a thread.
+#[cfg(target_os = "linux")]
+mod linux {
+    use std::io;
+
+    use rustix::thread::{CpuSet, gettid, sched_getaffinity, sched_setaffinity};
+
+    /// The highest nice value.
+    const LOWEST: i32 = 19;
+
+    pub(super) fn lower_thread() {
+        let _ = rustix::process::setpriority_process(Some(gettid()), LOWEST);
+    }
+
+    pub(super) fn confine(processors: &[usize]) -> io::Result<()> {
+        let mut set = CpuSet::new();
+        processors.iter().filter(|n| **n < CpuSet::MAX_CPU).for_each(|&n| set.set(n));
+        Ok(sched_setaffinity(None, &set)?)
+    }
+
+    /// The processors that this thread may use.
+    pub(super) fn allowed() -> Option<Vec<usize>> {
+        let allowed = sched_getaffinity(None).ok()?;
+        Some((0..CpuSet::MAX_CPU).filter(|&n| allowed.is_set(n)).collect())
+    }
+}
+
+/// Other systems share out processors by themselves.
+#[cfg(not(target_os = "linux"))]
+mod other {
+    use std::io;
+
+    pub(super) fn lower_thread() {}
+
+    pub(super) fn confine(_: &[usize]) -> io::Result<()> {
+        let why = "this system does not confine threads to processors; leave out --pin";
+        Err(io::Error::new(io::ErrorKind::Unsupported, why))
+    }
+
+    pub(super) fn allowed() -> Option<Vec<usize>> {
+        None
+    }
 }
 
 #[cfg(test)]
