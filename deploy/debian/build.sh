@@ -4,7 +4,8 @@
 # usage: deploy/debian/build.sh [FOLDER]      writes FOLDER/bolide_VERSION_ARCH.deb [default: target/debian]
 #        needs dpkg-dev, which finds what the binary depends on
 #
-# environment: BOLIDE  the executable [default: target/release/bolide]
+# environment: BOLIDE  the executable [default: target/release/bolide]; that of 64-bit ARM makes a package for ARM, with
+#                      qemu-aarch64-static to write its manual pages
 set -eu
 cd "$(dirname "$0")/../.."
 BOLIDE=$(realpath "${BOLIDE:-target/release/bolide}")
@@ -14,6 +15,11 @@ mkdir -p "$out"
 out=$(realpath "$out")
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 architecture=$(dpkg --print-architecture)
+prefix='' emulator=()
+if [ "$architecture" != arm64 ] && file -bL "$BOLIDE" | grep -q 'ARM aarch64'; then
+    architecture=arm64 prefix=aarch64-linux-gnu- emulator=(qemu-aarch64-static -L /usr/aarch64-linux-gnu)
+fi
+bolide() { "${emulator[@]}" "$BOLIDE" "$@"; }
 # The same sources give the same package.
 export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || stat -c %Y Cargo.toml)}
 umask 022
@@ -25,11 +31,11 @@ doc=$root/usr/share/doc/bolide
 mkdir -p "$root/DEBIAN" "$doc/examples"
 
 install -D -m 755 "$BOLIDE" "$root/usr/bin/bolide"
-strip --strip-unneeded --remove-section=.comment "$root/usr/bin/bolide"
+"${prefix}strip" --strip-unneeded --remove-section=.comment "$root/usr/bin/bolide"
 
-"$BOLIDE" man --out "$root/usr/share/man/man1"
+bolide man --out "$root/usr/share/man/man1"
 gzip -9n "$root"/usr/share/man/man1/*
-completions() { mkdir -p "$(dirname "$root/$2")" && "$BOLIDE" completions "$1" >"$root/$2"; }
+completions() { mkdir -p "$(dirname "$root/$2")" && bolide completions "$1" >"$root/$2"; }
 completions bash usr/share/bash-completion/completions/bolide
 completions zsh usr/share/zsh/vendor-completions/_bolide
 completions fish usr/share/fish/vendor_completions.d/bolide.fish
@@ -54,10 +60,16 @@ gzip -9n <CHANGELOG.md >"$doc/changelog.gz"
 } >"$doc/copyright"
 
 install -m 755 deploy/debian/postinst deploy/debian/prerm deploy/debian/postrm "$root/DEBIAN/"
-# dpkg-shlibdeps wants a source package around it.
-mkdir "$work/debian"
-printf 'Source: bolide\n\nPackage: bolide\nArchitecture: any\n' >"$work/debian/control"
-depends=$(cd "$work" && dpkg-shlibdeps -O --ignore-missing-info root/usr/bin/bolide 2>/dev/null | sed 's/^shlibs:Depends=//')
+if [ -n "$prefix" ]; then
+    # This machine has no packages of the other processor to ask: the newest version of a symbol says which library it needs.
+    libc=$("${prefix}objdump" -T "$root/usr/bin/bolide" | grep -oP 'GLIBC_\K[0-9.]+' | sort -V | tail -1)
+    depends="libc6 (>= $libc), libgcc-s1 (>= 4.2)"
+else
+    # dpkg-shlibdeps wants a source package around it.
+    mkdir "$work/debian"
+    printf 'Source: bolide\n\nPackage: bolide\nArchitecture: any\n' >"$work/debian/control"
+    depends=$(cd "$work" && dpkg-shlibdeps -O --ignore-missing-info root/usr/bin/bolide 2>/dev/null | sed 's/^shlibs:Depends=//')
+fi
 cat >"$root/DEBIAN/control" <<END
 Package: bolide
 Version: $version
