@@ -16,14 +16,20 @@
 //! | [`owner`] | whether the people whose machine this is need it |
 //! | [`private`] | files that are their owner's alone |
 //! | [`processors`] | which processors threads may use, and how urgent a thread is |
+//! | [`service`] | programs that the service manager of Windows starts |
 //! | [`terminal`] | keys one by one, and the size of the screen |
+
+use std::path::PathBuf;
+
+#[cfg(any(windows, test))]
+mod command_line;
 
 #[cfg(unix)]
 mod unix;
 #[cfg(unix)]
 pub use unix::{
     allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, owner, private,
-    processors, terminal,
+    processors, service, terminal,
 };
 
 #[cfg(windows)]
@@ -31,8 +37,39 @@ mod windows;
 #[cfg(windows)]
 pub use windows::{
     allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, owner, private,
-    processors, terminal,
+    processors, service, terminal,
 };
+
+/// A program that is to start with the machine, as its service manager keeps it.
+#[derive(Clone, Debug)]
+pub struct Service {
+    /// What commands call it.
+    pub name: String,
+    /// What lists call it.
+    pub title: String,
+    /// What it is for, as a sentence.
+    pub description: String,
+    /// Who runs it: `LocalService`, `DOMAIN\\user` and the like.
+    pub account: String,
+    /// The password of the account, where it has one.
+    pub password: Option<String>,
+    /// What this executable is started with; the first are [`Service::RUN`].
+    pub arguments: Vec<String>,
+    /// Where it starts, and where its log is; made if there is none, for the account and administrators alone.
+    pub folder: PathBuf,
+    /// Files that only the account and administrators may read from now on.
+    pub secrets: Vec<PathBuf>,
+    /// Folders that the account needs whole, if they are there already.
+    pub needs: Vec<PathBuf>,
+}
+
+impl Service {
+    /// How the command lines of all services of this program begin.
+    pub const RUN: [&str; 2] = ["service", "run"];
+}
+
+/// What a program does when it is started as a service; gives its exit code.
+pub type Body = Box<dyn FnOnce() -> u8 + Send>;
 
 /// Who may read a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,4 +13,5 @@ pub mod notice;
 pub mod owner;
 pub mod private;
 pub mod processors;
+pub mod service;
 pub mod terminal;

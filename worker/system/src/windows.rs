@@ -14,4 +14,6 @@ pub mod notice;
 pub mod owner;
 pub mod private;
 pub mod processors;
+mod registry;
+pub mod service;
 pub mod terminal;

@@ -6,14 +6,36 @@ use std::{
     ffi::{OsStr, OsString},
     io,
     os::unix::net::{SocketAddr, UnixDatagram},
+    time::Duration,
 };
+
+/// The shortest time between two signs of life.
+const SHORTEST: Duration = Duration::from_millis(10);
+
+/// Tells the manager, if there is one, lines `KEY=value`, such as `READY=1`.
+///
+/// # Errors
+/// If it does not listen.
+pub fn say(state: &str) -> io::Result<()> {
+    let Some(name) = std::env::var_os("NOTIFY_SOCKET") else { return Ok(()) };
+    send(&name, state)
+        .map_err(|error| io::Error::new(error.kind(), format!("NOTIFY_SOCKET {}: {error}", name.display())))
+}
+
+/// How often the manager wants a sign of life: twice within `WATCHDOG_USEC`. None where it does not ask, or asks another
+/// process (`WATCHDOG_PID`).
+pub fn interval() -> Option<Duration> {
+    let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    if number("WATCHDOG_PID").is_some_and(|asked| asked != u64::from(std::process::id())) {
+        return None;
+    }
+    let limit = number("WATCHDOG_USEC").filter(|limit| *limit > 0)?;
+    Some((Duration::from_micros(limit) / 2).max(SHORTEST))
+}
 
 /// Sends lines `KEY=value` to the socket `name`: a path, or an abstract name after `@`. A manager that does not read loses
 /// the datagram; nobody waits for it.
-///
-/// # Errors
-/// If nobody listens there.
-pub fn send(name: &OsStr, state: &str) -> io::Result<()> {
+fn send(name: &OsStr, state: &str) -> io::Result<()> {
     let address = address(name)?;
     let socket = UnixDatagram::unbound()?;
     socket.set_nonblocking(true)?;

@@ -65,6 +65,14 @@ pub fn open(options: &OpenOptions, path: &Path, readers: Readers) -> io::Result<
     }
 }
 
+/// Lets a user, written as `S-1-...`, and the administrators of the machine do all with a file, or with a folder and what is made in it
+/// from now on; and nobody else.
+pub(super) fn give(path: &Path, user: &str) -> io::Result<()> {
+    let handed_on = if path.is_dir() { HANDED_ON } else { "" };
+    let [system, administrators] = identity::ADMINISTRATORS;
+    allow(path, &[user, administrators, system], handed_on)
+}
+
 /// Who else can read a file, and the command that ends that; nothing where nobody can.
 ///
 /// # Errors
@@ -105,10 +113,14 @@ impl Drop for Descriptor {
     }
 }
 
-/// Replaces the list of a file or folder; `handed_on` says to whom it goes on.
 fn allow_owner_only(path: &Path, handed_on: &str) -> io::Result<()> {
-    let own = identity::own()?;
-    let text: Vec<u16> = format!("D:P(A;{handed_on};FA;;;{own})").encode_utf16().chain([0]).collect();
+    allow(path, &[&identity::own()?], handed_on)
+}
+
+/// Replaces the list of a file or folder; `handed_on` says to whom it goes on.
+fn allow(path: &Path, users: &[&str], handed_on: &str) -> io::Result<()> {
+    let entries: String = users.iter().map(|user| format!("(A;{handed_on};FA;;;{user})")).collect();
+    let text: Vec<u16> = format!("D:P{entries}").encode_utf16().chain([0]).collect();
     let mut descriptor = Descriptor(ptr::null_mut());
     let (mut present, mut dacl, mut default) = (0, ptr::null_mut(), 0);
     let path = wide(path)?;
