@@ -21,6 +21,7 @@ mod help;
 use help::{EXIT_CODES, PICTURE_EXAMPLES, RUN_EXAMPLES, SUBMIT_EXAMPLES};
 
 use crate::{
+    as_service::ServiceArgs,
     bench::grind::Speed,
     certs::arguments::Certs,
     client::arguments::{ClientArgs, SubmitArgs},
@@ -145,6 +146,12 @@ pub enum Command {
         /// What to make
         #[command(subcommand)]
         what: Certs,
+    },
+    /// Have Windows start a master or a worker
+    Service {
+        /// What to do
+        #[command(subcommand)]
+        what: ServiceArgs,
     },
     /// Write a commented deck of a usual problem, or list them
     Init {

@@ -4,9 +4,10 @@
 //! [`embedded`] runs them, and [`drive`] has workers over links. [`daemon`] listens; the [`scheduler`] owns [`hosts`] and [`queue`], asks [`footprint`] for the memory of a job, and hears [`notice`]s: each
 //! [`connection`] is one task that carries messages, which waits for one of the [`places`], the [`client_requests`] answers clients, the [`desk`] reads their decks, [`service`] runs one job of the queue. [`client`] is the other end of the client requests;
 //! [`ca_folder`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`neighbour`] whose process calls on loopback; [`processes`] starts workers as
-//! children for one run, [`add`] over ssh. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster. [`mod@study`] runs a deck with many values of its parameters. [`program`] is the command line.
+//! children for one run, [`add`] over ssh, [`as_service`] has Windows do it. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster. [`mod@study`] runs a deck with many values of its parameters. [`program`] is the command line.
 
 pub mod add;
+pub mod as_service;
 pub mod balance;
 pub mod bench;
 pub mod ca_folder;

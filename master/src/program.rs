@@ -16,7 +16,7 @@ use tracing_subscriber::{Layer, filter::Targets, registry::LookupSpan};
 use worker::{daemon::Listen, owner::Rules, runner::Compute};
 
 use crate::{
-    add, bench,
+    add, as_service, bench,
     bench::grind::Speed,
     ca_folder::CaFolder,
     certs::{self, arguments::Certs},
@@ -59,6 +59,9 @@ pub fn main(compute: Compute) -> ExitCode {
         Command::Results { job, out, force, at } => client::results(job, out, force, &at),
         Command::Bench { what: Some(Bench::Messages(args)), .. } => bench::messages::run(&args),
         Command::Bench { what: None, grind } => bench::grind::run(&grind),
+        Command::Service { what } => {
+            as_service::run(what, join_first, move |command| serve(command, compute))
+        }
         Command::Certs { what } => make_certificates(what),
         Command::Top { at } => client::top::run(&at),
         Command::Completions { shell } => {
@@ -87,14 +90,40 @@ pub fn main(compute: Compute) -> ExitCode {
     })
 }
 
-fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
-    let join = args.join.clone().or_else(|| std::env::var(newcomer::TOKEN).ok());
-    if let (Some(token), Some(folder)) = (&join, &args.certs)
+/// What a service does.
+fn serve(command: Command, compute: Compute) -> Result<ExitCode, String> {
+    match command {
+        Command::Master(args) => daemon::run(&args),
+        Command::Worker(args) => {
+            // Whoever sits at the machine comes first.
+            system::processors::low_priority_of_process();
+            work(args, compute)
+        }
+        _ => Err("no daemon".to_owned()),
+    }
+}
+
+/// Exchanges the token of a worker, if it has one and no certificate yet.
+fn join_first(command: &Command) -> Result<(), String> {
+    match command {
+        Command::Worker(args) => join(args),
+        _ => Ok(()),
+    }
+}
+
+fn join(args: &WorkerArgs) -> Result<(), String> {
+    let token = args.join.clone().or_else(|| std::env::var(newcomer::TOKEN).ok());
+    if let (Some(token), Some(folder)) = (&token, &args.certs)
         && !tls::Paths::in_folder(folder).certificate.exists()
     {
         let name = args.name.clone().unwrap_or_else(machine::host_name);
         newcomer::join(&args.master, &newcomer::token(token)?, handshake::host_of(&name), folder)?;
     }
+    Ok(())
+}
+
+fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
+    join(&args)?;
     if let Some(pin) = &args.pin {
         pin.apply()?;
     }

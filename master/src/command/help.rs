@@ -24,7 +24,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "resume", "rm",
         ],
     ),
-    ("Set up and measure", &["add", "certs", "bench", "simulate", "completions", "man"]),
+    ("Set up and measure", &["add", "service", "certs", "bench", "simulate", "completions", "man"]),
 ];
 
 /// The first commands of somebody new.

@@ -19,8 +19,8 @@ use windows_sys::Win32::{
             ConvertStringSecurityDescriptorToSecurityDescriptorW, GetNamedSecurityInfoW, SDDL_REVISION_1,
             SE_FILE_OBJECT, SetNamedSecurityInfoW,
         },
-        DACL_SECURITY_INFORMATION, GetAce, GetSecurityDescriptorDacl, PROTECTED_DACL_SECURITY_INFORMATION,
-        PSECURITY_DESCRIPTOR,
+        DACL_SECURITY_INFORMATION, GetAce, GetSecurityDescriptorDacl, OWNER_SECURITY_INFORMATION,
+        PROTECTED_DACL_SECURITY_INFORMATION, PSECURITY_DESCRIPTOR,
     },
     Storage::FileSystem::FILE_READ_DATA,
     System::SystemServices::{ACCESS_ALLOWED_ACE_TYPE, ACCESS_DENIED_ACE_TYPE},
@@ -71,6 +71,30 @@ pub(super) fn give(path: &Path, user: &str) -> io::Result<()> {
     let handed_on = if path.is_dir() { HANDED_ON } else { "" };
     let [system, administrators] = identity::ADMINISTRATORS;
     allow(path, &[user, administrators, system], handed_on)
+}
+
+/// Whose a file or folder is, written as `S-1-...`: he can change who may do what with it.
+pub(super) fn owner(path: &Path) -> io::Result<String> {
+    let path = wide(path)?;
+    let mut descriptor = Descriptor(ptr::null_mut());
+    let mut owner = ptr::null_mut();
+    // SAFETY: the path ends in a zero; the name lies in the descriptor, which is ours to free and lives to the end of this function.
+    unsafe {
+        let result = GetNamedSecurityInfoW(
+            path.as_ptr(),
+            SE_FILE_OBJECT,
+            OWNER_SECURITY_INFORMATION,
+            &raw mut owner,
+            ptr::null_mut(),
+            ptr::null_mut(),
+            ptr::null_mut(),
+            &raw mut descriptor.0,
+        );
+        if result != ERROR_SUCCESS {
+            return Err(io::Error::from_raw_os_error(result as i32));
+        }
+        identity::written(owner)
+    }
 }
 
 /// Who else can read a file, and the command that ends that; nothing where nobody can.
@@ -232,6 +256,9 @@ mod tests {
         let own = identity::own().expect("a user");
         let list = readers(&path).expect("a list");
         assert!(list == [own], "{list:?}");
+        give(&path, "S-1-5-19").expect("ours");
+        let [system, administrators] = identity::ADMINISTRATORS;
+        assert_eq!(readers(&path).expect("a list"), ["S-1-5-19", administrators, system]);
         assert!(open_to_others(&folder.path().join("none")).is_err());
     }
 }

@@ -281,7 +281,7 @@ fn explain(name: &str, account: &str, error: &io::Error) -> String {
             format!("; `bolide service remove {name}` removes it, --name NAME makes another beside it")
         }
         ERROR_SERVICE_DOES_NOT_EXIST => {
-            "; `sc query type= service state= all` lists what there is".to_owned()
+            "; `sc.exe query type= service state= all` lists what there is".to_owned()
         }
         ERROR_SERVICE_MARKED_FOR_DELETE => "; close the windows that show services, and try again".to_owned(),
         ERROR_INVALID_SERVICE_ACCOUNT => {

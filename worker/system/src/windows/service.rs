@@ -27,6 +27,7 @@ use windows_sys::Win32::{
 };
 
 use super::{
+    identity,
     notice::{self, End},
     private,
     registry::{self, Entry},
@@ -58,7 +59,10 @@ struct Task {
 pub fn folder(name: &str) -> Result<PathBuf, String> {
     match std::env::var_os("ProgramData") {
         Some(data) if !data.is_empty() => Ok(Path::new(&data).join("bolide").join(name)),
-        _ => Err("the environment has no ProgramData; name a folder with --folder".to_owned()),
+        _ => {
+            Err("the environment has no ProgramData, which is where Windows keeps data of programs"
+                .to_owned())
+        }
     }
 }
 
@@ -95,7 +99,19 @@ fn prepare(service: &Service, entry: &Entry, exe: &str) -> Result<Vec<String>, S
         let path = path.display().to_string();
         move |e: io::Error| format!("{path}: {e}")
     };
+    if service.folder.is_symlink() {
+        return Err(format!("{}: a link; name another folder with --folder", service.folder.display()));
+    }
     fs::create_dir_all(&service.folder).map_err(fault(&service.folder))?;
+    // Everybody may make folders where data of programs are kept.
+    let owner = private::owner(&service.folder).map_err(fault(&service.folder))?;
+    let own = identity::own().map_err(|e| format!("the user of this program: {e}"))?;
+    if ![&*user, &*own].into_iter().chain(identity::ADMINISTRATORS).any(|trusted| trusted == owner) {
+        let folder = service.folder.display();
+        return Err(format!(
+            "{folder} belongs to {owner}, who could change what the service keeps; remove it, or name another with --folder"
+        ));
+    }
     private::give(&service.folder, &user).map_err(fault(&service.folder))?;
     for path in service.secrets.iter().filter(|path| path.exists()) {
         private::give(path, &user).map_err(fault(path))?;
@@ -126,7 +142,9 @@ pub fn remove(name: &str) -> Result<(), String> {
         .get(1..)
         .is_some_and(|words| words.starts_with(&Service::RUN.map(String::from)))
     {
-        return Err(format!("service {name} is not one of Bolide, it runs {line}; `sc delete` removes it"));
+        return Err(format!(
+            "service {name} is not one of Bolide, it runs {line}; `sc.exe delete` removes it"
+        ));
     }
     let began = Instant::now();
     // One that is starting hears it later.
@@ -158,7 +176,7 @@ pub fn run(name: &str, folder: &Path, body: Body) -> Result<(), String> {
     }
     let error = io::Error::last_os_error();
     if error.raw_os_error() == Some(ERROR_FAILED_SERVICE_CONTROLLER_CONNECT as i32) {
-        return Err(format!("the service manager alone starts this: sc start {name}"));
+        return Err(format!("the service manager alone starts this: net start {name}"));
     }
     Err(format!("service {name}: {error}"))
 }
@@ -235,7 +253,7 @@ mod tests {
     fn only_the_manager_runs_a_service_and_only_those_of_bolide_are_removed() {
         let body = || panic!("the manager did not start this test");
         let why = run("bolide-test", Path::new("."), Box::new(body)).unwrap_err();
-        assert!(why.contains("sc start bolide-test"), "{why}");
+        assert!(why.contains("net start bolide-test"), "{why}");
         assert!(stops().is_none());
         let why = remove("bolide-none").unwrap_err();
         assert!(why.contains("bolide-none"), "{why}");
