@@ -29,28 +29,25 @@ const WRONG_FLAGS: u8 = 2;
 /// What to do about services.
 #[derive(Clone, Debug, Subcommand)]
 pub enum ServiceArgs {
-    /// Register a service (as administrator): it starts with Windows, and
-    /// again after failures
+    /// Register a worker or a master, as administrator
     Install {
         /// Its name [default: bolide-master or bolide-worker]
         #[arg(long, value_parser = name)]
         name: Option<String>,
-        /// Who runs it: LocalService, NetworkService, LocalSystem, "NT
-        /// SERVICE\NAME", DOMAIN\USER or .\USER [default: LocalService]
+        /// The user it runs as [default: LocalService]
         #[arg(long)]
         account: Option<String>,
-        /// Read the password of this user there, - for standard input
+        /// File with its password, - for standard input
         #[arg(long, value_name = "FILE", requires = "account")]
         password_from: Option<PathBuf>,
-        /// Where it starts and writes NAME.log, and what a master keeps
-        /// [default: %ProgramData%\bolide\NAME]
+        /// Its folder [default: %ProgramData%\bolide\NAME]
         #[arg(long)]
         folder: Option<PathBuf>,
         /// `master` or `worker`, and its flags
         #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true, value_name = "COMMAND")]
         command: Vec<String>,
     },
-    /// Stop a service and remove it (as administrator); its folder stays
+    /// Stop a service and remove it, as administrator; its folder stays
     Remove {
         /// As it was registered: bolide-worker
         name: String,
@@ -355,6 +352,17 @@ mod tests {
         ] {
             let said = daemon(line).err().expect("wrong");
             assert!(said.contains(why), "{line}: {said}");
+        }
+    }
+
+    #[test]
+    fn the_help_fits_its_width() {
+        let mut cli = Cli::command();
+        let service = cli.find_subcommand_mut("service").expect("it is there");
+        let mut helps = vec![service.render_help()];
+        helps.extend(service.get_subcommands_mut().map(clap::Command::render_help));
+        for line in helps.iter().map(ToString::to_string).collect::<String>().lines() {
+            assert!(line.chars().count() <= 80, "{line}");
         }
     }
 

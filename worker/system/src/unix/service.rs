@@ -41,3 +41,16 @@ fn refuse<T>(name: &str) -> Result<T, String> {
         "service {name}: only Windows keeps services in this way; here systemd starts Bolide, by `systemctl enable --now bolide-worker@1`: deploy/systemd/README.md"
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_wants_a_service_hears_of_systemd() {
+        let why = folder("bolide-worker").unwrap_err();
+        assert!(why.contains("bolide-worker: ") && why.contains("deploy/systemd"), "{why}");
+        assert_eq!(remove("bolide-worker"), Err(why.clone()));
+        assert_eq!(run("bolide-worker", Path::new("/"), Box::new(|| 0)), Err(why));
+    }
+}
