@@ -1,9 +1,9 @@
 #!/bin/bash
-# Builds bolide.exe for 64-bit Windows on an x86-64 Debian, runs unit tests under wine, and packs a zip.
+# Builds bolide.exe for 64-bit Windows on an x86-64 Debian, packs a zip, and runs the tests of all libraries but the master's under wine.
 #
 # usage: deploy/windows/build.sh [--install]
-#        --install gets what it needs from Debian (root): a compiler with the sources of its standard library, the compiler and
-#        linker of mingw, wine, zip. The standard library is built from these sources; no rustup target is needed.
+#        --install gets what it needs: the compiler and linker of mingw, wine and zip from Debian (root), the target from rustup. Where
+#        rustup is missing or has no target, Debian's compiler with the sources of its standard library, which is built then
 #
 # environment: CARGO_TARGET_DIR  where it is built [default: target]
 #
@@ -14,8 +14,9 @@ triple=x86_64-pc-windows-gnu
 mingw=x86_64-w64-mingw32
 if [ "${1:-}" = --install ]; then
     apt-get update -q || exit 3
-    apt-get install -y -q --no-install-recommends rustc-web rust-web-src gcc-mingw-w64-x86-64-posix \
-        g++-mingw-w64-x86-64-posix libz-mingw-w64 wine64 zip || exit 3
+    apt-get install -y -q --no-install-recommends gcc-mingw-w64-x86-64-posix g++-mingw-w64-x86-64-posix libz-mingw-w64 \
+        wine64 zip || exit 3
+    rustup target add $triple || apt-get install -y -q --no-install-recommends rustc-web rust-web-src || exit 3
 fi
 for program in $mingw-gcc-posix $mingw-dlltool zip; do
     command -v $program >/dev/null || { echo "build.sh: no $program; --install gets it (root)" >&2; exit 3; }
@@ -54,7 +55,7 @@ zip -q -j "$packed" "$exe" deploy/windows/README.md LICENSE-MIT LICENSE-APACHE |
 echo "$packed: $(stat -c %s "$packed") bytes"
 
 command -v /usr/lib/wine/wine64 >/dev/null || { echo "build.sh: no wine; no test was run" >&2; exit 3; }
-cargo test --release --locked -p mechanics -p deck -p protocol -p worker --lib --target $triple "${std[@]}" || exit 1
+cargo test --release --locked -p mechanics -p deck -p protocol -p worker --target $triple "${std[@]}" || exit 1
 # Wine 8 says of no socket whose it is, and keeps no list of who may read a file.
 cargo test --release --locked -p system --lib --target $triple "${std[@]}" -- --skip windows_lists_the_sockets \
     --skip lets_nobody_else_read || exit 1
