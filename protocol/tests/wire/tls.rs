@@ -9,10 +9,11 @@ use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair, 
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rustls::{ClientConfig, RootCertStore, ServerConfig};
-use std::fs;
-use std::os::unix::fs::PermissionsExt;
+use std::fs::{self, OpenOptions};
+use std::io::Write;
 use std::sync::Arc;
 use std::time::Duration;
+use system::Readers;
 use tempfile::TempDir;
 use tokio::io::BufReader;
 use tokio::net::{TcpListener, TcpStream};
@@ -50,8 +51,9 @@ impl Authority {
         let authority = self.params().self_signed(&self.key).expect("signs");
         fs::write(&paths.ca, authority.pem()).expect("ours");
         fs::write(&paths.certificate, certificate.pem()).expect("ours");
-        fs::write(&paths.key, key.serialize_pem()).expect("ours");
-        fs::set_permissions(&paths.key, PermissionsExt::from_mode(0o600)).expect("ours");
+        let mut options = OpenOptions::new();
+        let file = system::private::open(options.write(true).create_new(true), &paths.key, Readers::Owner);
+        file.and_then(|mut file| file.write_all(key.serialize_pem().as_bytes())).expect("ours");
         (folder, paths)
     }
 }
@@ -299,17 +301,23 @@ fn files_that_cannot_be_used_are_named() {
     let (_folder, paths) = Authority::new("lab").host("bolide:master", usual);
     let text = |paths: &Paths| tls::server_config(paths).expect_err("unusable").to_string();
 
-    fs::set_permissions(&paths.key, PermissionsExt::from_mode(0o640)).expect("ours");
-    let key = paths.key.display();
-    assert_eq!(text(&paths), format!("{key} has mode 0640, must be 0600; run chmod 600 {key}"));
-    fs::set_permissions(&paths.key, PermissionsExt::from_mode(0o600)).expect("ours");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        fs::set_permissions(&paths.key, PermissionsExt::from_mode(0o640)).expect("ours");
+        let key = paths.key.display();
+        assert_eq!(text(&paths), format!("{key} has mode 0640, must be 0600; run chmod 600 {key}"));
+        fs::set_permissions(&paths.key, PermissionsExt::from_mode(0o600)).expect("ours");
+    }
 
     fs::write(&paths.ca, "no certificate").expect("ours");
     let path = paths.ca.display();
     assert_eq!(text(&paths), format!("{path}: no certificate in it; make certificates with `bolide certs`"));
     fs::remove_file(&paths.ca).expect("ours");
     let missing = text(&paths);
-    assert!(missing.starts_with(&format!("{path}: ")) && missing.contains("No such file"), "{missing}");
+    // Its number is that of Unix and of Windows.
+    let why = std::io::Error::from_raw_os_error(2);
+    assert!(missing.starts_with(&format!("{path}: ")) && missing.contains(&why.to_string()), "{missing}");
 }
 
 #[test]
