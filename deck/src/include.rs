@@ -77,11 +77,32 @@ pub(crate) fn candidates(file: &str, path: &str, folders: &[String]) -> Vec<Stri
     list
 }
 
-/// A path that a file says, as seen from where that file is seen from.
+/// A path that a file says, as seen from where that file is seen from. Whoever reads a deck has to find what another gathered, so both
+/// separators and the drives of Windows are known on every system.
 pub(crate) fn beside(file: &str, name: &str) -> String {
     let name = name.replace('\\', "/");
-    match file.rsplit_once('/') {
-        Some((folder, _)) if !name.starts_with('/') => format!("{folder}/{name}"),
+    let has_drive = matches!(name.as_bytes(), [drive, b':', b'/', ..] if drive.is_ascii_alphabetic());
+    match file.rsplit_once(['/', '\\']) {
+        Some((folder, _)) if !name.starts_with('/') && !has_drive => format!("{folder}/{name}"),
         _ => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_seen_from_the_folder_of_its_file_by_either_separator() {
+        for (file, name, seen) in [
+            ("plate.k", "mesh.k", "mesh.k"),
+            ("decks/plate.k", "mesh.k", "decks/mesh.k"),
+            ("decks\\plate.k", "mesh.k", "decks/mesh.k"),
+            ("C:\\lab\\decks/plate.k", "parts\\mesh.k", "C:\\lab\\decks/parts/mesh.k"),
+            ("decks/plate.k", "/lab/mesh.k", "/lab/mesh.k"),
+            ("decks\\plate.k", "D:\\lab\\mesh.k", "D:/lab/mesh.k"),
+        ] {
+            assert_eq!(beside(file, name), seen, "{file}: {name}");
+        }
     }
 }

@@ -297,7 +297,7 @@ pub fn start_from_mesh(text: &str, file_name: &str, mesh_name: &str) -> Result<S
         let words = format!("a mesh does not say its units, {} is assumed; give --units", units.name);
         warnings.push(Warning { file: name.to_string(), line: 1, words });
     }
-    let title = mesh_name.rsplit('/').next().unwrap_or(mesh_name);
+    let title = mesh_name.rsplit(['/', '\\']).next().unwrap_or(mesh_name);
     Ok(Start { deck: mesh_file::skeleton::text(&mesh, title, mesh_name, units), warnings })
 }
 

@@ -115,6 +115,7 @@ async fn cycle_frames_overtake_bulk() {
 }
 
 #[tokio::test]
+#[cfg_attr(windows, ignore = "Windows has no limit to set for bytes that it has taken and not sent")]
 async fn cycle_frames_overtake_bulk_in_the_system_too() {
     let (near, far) = tcp(false).await;
     let (sender, _receiver) = split(near, no_heartbeats());
