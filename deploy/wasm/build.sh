@@ -75,7 +75,7 @@ for deck in deck/examples/*.toml deck/examples/*.k; do
         *) echo "build.sh: $deck: the worker's hash is ${due:-missing}, Node's $found" >&2; wrong=1 ;;
     esac
 done
-# A block with another bit has another hash, or is refused.
+# A cut block is refused.
 head -c 200 "$made/block" >"$made/cut"
 node deploy/wasm/recompute.mjs "$module" "$made/cut" 2>"$made/refused" && { echo "build.sh: a cut block was computed" >&2; wrong=1; }
 cat "$made/refused"

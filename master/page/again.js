@@ -5,13 +5,13 @@ import { element, number } from './lists.js';
 import { recompute } from './recompute.mjs';
 
 const $ = id => document.getElementById(id);
-/// The job that the words are of, and whether its block is being computed.
+/// The job that the words are of, and whether a block is being computed.
 let shown = null, computing = false;
 
 /// Offers the newest block of a job; `proved` is what the sheet says of it, if there is one.
 export function offer(job, proved) {
   $('again-box').hidden = !proved;
-  if (!proved || computing) return;
+  if (!proved || computing && job === shown) return;
   $('again-file').href = address(`api/jobs/${job}/sample`);
   $('again-run').onclick = () => compare(job, proved);
   // What was computed stays until it is asked for again, or another job is chosen.
@@ -35,19 +35,19 @@ async function compare(job, offered) {
     const took = performance.now() - from;
     // The run went on meanwhile: what the master says of the block that it gave.
     const proved = cycle === offered.cycle ? offered : (await json(`api/jobs/${job}/sheet`)).proved;
-    if (cycle !== proved.cycle) throw new Error('another block came meanwhile: compute again');
-    if (job === shown) {
-      $('again-of').textContent = `${elements} elements of part ${proved.part} in cycle ${cycle}, in ${number(took, 3)} ms here.`;
-      $('again-hashes').replaceChildren(...[[`worker ${proved.worker}, master`, proved.hash], ['this browser', hash]].flatMap(
-        ([who, text]) => [element('dt', { textContent: who }), element('dd', {}, element('code', { textContent: text }))]));
-      if (hash === proved.hash) say('the same bits', 'good');
-      else say('OTHER BITS: keep out that worker, or this browser', 'bad');
-    }
+    if (cycle !== proved?.cycle) throw new Error('another block came meanwhile: compute again');
+    if (job !== shown) return;
+    $('again-of').textContent = `${elements} elements of part ${proved.part} in cycle ${cycle}, in ${number(took, 3)} ms here.`;
+    $('again-hashes').replaceChildren(...[[`worker ${proved.worker}, master`, proved.hash], ['this browser', hash]].flatMap(
+      ([who, text]) => [element('dt', { textContent: who }), element('dd', {}, element('code', { textContent: text }))]));
+    if (hash === proved.hash) say('the same bits', 'good');
+    else say('OTHER BITS: keep out that worker, or this browser', 'bad');
   } catch (error) {
-    say(error.message, 'bad');
+    if (job === shown) say(error.message, 'bad');
+  } finally {
+    computing = false;
+    $('again-run').disabled = false;
   }
-  computing = false;
-  $('again-run').disabled = false;
 }
 
 function say(words, grade) {

@@ -95,7 +95,7 @@ pub enum Action {
     /// without it, and it must not come back.
     Dismiss(usize, String),
     /// A worker's sample agreed with what it came to here; another may compute it a third time.
-    Proved(Box<Proved>),
+    Proved(Arc<Proved>),
     /// Tell the user how far it is.
     Progress(Progress),
     /// The job is over.

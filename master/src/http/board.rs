@@ -239,8 +239,8 @@ impl JobView {
     }
 
     /// A worker's sample agreed with what it came to here.
-    pub fn proved(&mut self, proved: &Proved) {
-        self.proved = Some(Arc::new(proved.clone()));
+    pub fn proved(&mut self, proved: &Arc<Proved>) {
+        self.proved = Some(Arc::clone(proved));
     }
 
     /// The newest sample that agreed.

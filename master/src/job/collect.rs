@@ -137,7 +137,7 @@ impl Job {
         let Some((position, hash, sample)) = self.epoch.samples.take_proved() else { return };
         let worker = self.workers.spec(self.epoch.at_work[position]).name.clone();
         let part = self.problem.model.mesh.parts[sample.piece.part as usize].name.clone();
-        actions.push(Action::Proved(Box::new(Proved { worker, part, hash, sample })));
+        actions.push(Action::Proved(Arc::new(Proved { worker, part, hash, sample })));
     }
 
     /// What a checkpoint at the start of a cycle holds beside the state, once the cycle before is booked with this vote.

@@ -8,7 +8,6 @@
 //! beyond a limit.
 
 use mechanics::{lanes::Width, proof, sample::Sample};
-use serde::{Deserialize, Serialize};
 
 #[cfg(target_family = "wasm")]
 pub mod module;
@@ -21,13 +20,6 @@ pub const LIMIT: usize = 256 << 20;
 /// The release that computes a sample: another one may have other bits.
 pub const RELEASE: &str = env!("CARGO_PKG_VERSION");
 
-/// What stands behind the first letters.
-#[derive(Serialize, Deserialize)]
-struct Contents<S, R> {
-    release: R,
-    sample: S,
-}
-
 fn config() -> impl bincode::config::Config {
     bincode::config::standard().with_little_endian().with_fixed_int_encoding().with_limit::<LIMIT>()
 }
@@ -38,8 +30,7 @@ fn config() -> impl bincode::config::Config {
 /// If it would be longer than [`LIMIT`].
 pub fn write(sample: &Sample) -> Result<Vec<u8>, String> {
     let mut bytes = MAGIC.to_vec();
-    let contents = Contents { release: RELEASE, sample };
-    let length = bincode::serde::encode_into_std_write(&contents, &mut bytes, config())
+    let length = bincode::serde::encode_into_std_write((RELEASE, sample), &mut bytes, config())
         .map_err(|error| format!("the block cannot be written: {error}"))?;
     if length > LIMIT {
         return Err(format!(
@@ -61,15 +52,15 @@ pub fn read(bytes: &[u8]) -> Result<Sample, String> {
     let (release, _) = bincode::serde::decode_from_slice::<String, _>(rest, config()).map_err(damaged)?;
     if release != RELEASE {
         return Err(format!(
-            "the block is of Bolide {release}, this is {RELEASE}; compute it with that release"
+            "the block is of Bolide {release:?}, this is {RELEASE}; compute it with that release"
         ));
     }
-    let decoded = bincode::serde::decode_from_slice::<Contents<Sample, String>, _>(rest, config());
-    let (contents, length) = decoded.map_err(damaged)?;
+    let decoded = bincode::serde::decode_from_slice::<(String, Sample), _>(rest, config());
+    let ((_, sample), length) = decoded.map_err(damaged)?;
     if length != rest.len() {
         return Err(format!("the block is damaged: {length} bytes are read, {} are there", rest.len()));
     }
-    Ok(contents.sample)
+    Ok(sample)
 }
 
 /// What was computed again.
@@ -101,7 +92,7 @@ pub fn answer(bytes: &[u8]) -> String {
         Ok(Recomputed { cycle, elements, hash, proof }) => {
             format!(r#"{{"cycle":{cycle},"elements":{elements},"hash":"{hash}","proof":"{proof}"}}"#)
         }
-        // Rust's escapes of quotes, backslashes and new lines are those of JSON; the reasons have no other letters of the kind.
+        // Rust's escapes of quotes and backslashes are those of JSON, and the reasons have no other letters that need one.
         Err(reason) => format!(r#"{{"error":{reason:?}}}"#),
     }
 }
@@ -139,7 +130,10 @@ mod tests {
         let mut other = bytes.clone();
         // Behind the letters stand eight bytes of a length, then the release.
         other[24] = b'9';
-        assert!(read(&other).expect_err("a release").contains("is of Bolide 9"));
+        assert!(read(&other).expect_err("a release").contains("is of Bolide \"9.1.0\""));
+        other[24] = 1;
+        let words = r#"{"error":"the block is of Bolide \"\\u{1}.1.0\", this is 0.1.0; compute it with that release"}"#;
+        assert_eq!(answer(&other), words, "it is JSON whatever letters the release has");
         let mut endless = bytes;
         endless[16..24].fill(0xff);
         assert!(read(&endless).expect_err("a length").contains("damaged"));
