@@ -135,7 +135,7 @@ fn measure(model: &Model, index: usize) -> Measured {
     let part = &mesh.parts[index];
     let material = &setup.materials[part.material as usize];
     let is_rigid = setup.bodies.iter().any(|body| body.parts.binary_search(&(index as u32)).is_ok());
-    let sound = ((material.bulk() + 4.0 / 3.0 * material.shear()) / material.density).sqrt();
+    let sound = material.sound_speed();
     let mut this = Measured {
         mass: 0.0,
         centre: [0.0; 3],

@@ -23,6 +23,7 @@ mod law;
 mod load;
 mod modes;
 mod order;
+mod perforation;
 mod rigid;
 mod ring;
 mod shell;
@@ -152,6 +153,8 @@ macro_rules! each_case_of_the_book {
             exposed: a_ball_goes_through_a_plate_at_any_speed_and_gap long;
             soft: a_steel_block_thrown_on_foam_rubber_and_water_stays_outside quick;
             friction: a_block_on_an_incline_rests_or_slides_after_coulomb long;
+            perforation: a_blunt_projectile_goes_through_steel_from_the_measured_velocity_on long;
+            perforation: an_ogive_keeps_of_its_velocity_what_it_kept_behind_a_slab_of_concrete long;
             rigid: a_free_top_precesses_after_euler quick;
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;
             rigid: a_rigid_mass_on_the_end_of_a_bar_slows_down_after_saint_venant quick;

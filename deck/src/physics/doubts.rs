@@ -87,7 +87,7 @@ fn values(model: &Model, measured: &[Measured], units: &Units, doubts: &mut Vec<
                 short(density)
             ));
         }
-        let sound = ((material.bulk() + 4.0 / 3.0 * material.shear()) / material.density).sqrt() * speed_unit;
+        let sound = material.sound_speed() * speed_unit;
         if known.contains(&density) && !material.is_gas() && !SOUNDS.contains(&sound) {
             doubts.push(format!(
                 "part \"{}\": waves run at {} m/s by its moduli and density, from 20 to 25000 m/s in any solid or liquid; check the moduli: \

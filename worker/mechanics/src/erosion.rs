@@ -117,7 +117,7 @@ impl Eroding {
         let measures_shape = Shape::of(criteria).is_some();
         let mut eroding = Self {
             criteria: *criteria,
-            sound_square: (material.bulk() + 4.0 / 3.0 * material.shear()) / material.density,
+            sound_square: material.wave_modulus() / material.density,
             frequency: criteria.time_step.map_or(f64::INFINITY, |limit| safety_factor / limit),
             eroded: vec![ALIVE; n_slots],
             strain: vec![0.0; if criteria.incremental_strain.is_some() { n_slots } else { 0 }],

@@ -336,7 +336,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     let mut index = 0;
     for part in &mesh.parts {
         let material = &setup.materials[part.material as usize];
-        let modulus = material.bulk() + 4.0 / 3.0 * material.shear();
+        let modulus = material.wave_modulus();
         sound = sound.max((modulus / material.density).sqrt());
         driven2 = driven2.max(2.0 * material.initial_energy() / material.density);
         let strength = modulus.max(material.density * top_speed2).max(pressure);
@@ -441,7 +441,7 @@ pub fn closing_steps(
             return f64::INFINITY;
         }
         let material = &materials[part.material as usize];
-        let speed = ((material.bulk() + 4.0 / 3.0 * material.shear()) / material.density).sqrt();
+        let speed = material.sound_speed();
         let volumes = part.corner_volumes(&mesh.positions);
         let thinnest = volumes.into_par_iter().enumerate().map(|(e, volume)| {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);

@@ -204,6 +204,16 @@ impl Material {
         }
     }
 
+    /// Modulus of waves of one strain at rest: that of the bulk and four thirds of that of shear (stress).
+    pub fn wave_modulus(&self) -> f64 {
+        self.bulk() + 4.0 / 3.0 * self.shear()
+    }
+
+    /// Speed of sound of such waves (velocity).
+    pub fn sound_speed(&self) -> f64 {
+        (self.wave_modulus() / self.density).sqrt()
+    }
+
     /// Internal energy at the start (energy per initial volume).
     pub fn initial_energy(&self) -> f64 {
         match self.eos {

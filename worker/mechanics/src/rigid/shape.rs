@@ -206,7 +206,7 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
     let mut element = 0;
     for (p, part) in (0..).zip(&mesh.parts) {
         let material = &materials[part.material as usize];
-        let sound = ((material.bulk() + 4.0 / 3.0 * material.shear()) / material.density).sqrt();
+        let sound = material.sound_speed();
         for e in 0..part.n_elements() {
             if parts.binary_search(&p).is_ok() {
                 let x = part.corners(e).map(|n| mesh.positions[n as usize]);

@@ -202,7 +202,7 @@ impl Group for Solids {
         // The damage that the last step left chose the coefficient of that step.
         let viscous =
             if state(DAMAGE) >= 1.0 { self.control.of_failed(material) } else { self.control.of_whole() };
-        let stiffness = material.bulk() + 4.0 / 3.0 * material.shear();
+        let stiffness = material.wave_modulus();
         let sound = (stiffness / material.density).sqrt();
         let leaving = Leaving {
             x: at(x),
