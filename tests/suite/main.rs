@@ -23,6 +23,7 @@ mod starts;
 mod sums;
 mod tearing;
 mod tetrahedra;
+mod triangles;
 mod trusses;
 
 /// A row that nobody computes would look like one that holds.

@@ -35,7 +35,8 @@ pub(super) struct Geometry<L> {
     pub gz: L,
     /// Moments of x x, x y and y y of the pattern, of `bx` and of `by`: what they see of a curved deflection.
     pub curved: [[L; 3]; 3],
-    /// Least normal component of a corner's edge product (area); not positive for an element turned over.
+    /// Least normal component of a corner's edge product (area); not positive for an element turned over. Of a triangle that of
+    /// the corners that are one alone.
     pub least: L,
 }
 
@@ -60,7 +61,10 @@ impl<L: Lane> Geometry<L> {
         let e1 = between.scaled(one / between.dot(&between).sqrt());
         let e2 = e3.cross(&e1);
 
-        let warp = r[1].mul_add(minus, &r[0]).mul_add(one, &r[3].mul_add(minus, &r[2])).scaled(quarter);
+        // From corner 3 to 2: nothing in a triangle, whose third corner stands for both.
+        let last_side = r[3].mul_add(minus, &r[2]);
+        let is_triangle = last_side.dot(&last_side).less_equal(L::splat(0.0));
+        let warp = r[1].mul_add(minus, &r[0]).mul_add(one, &last_side).scaled(quarter);
         let (tx, ty) = (-(half * e1.dot(&back)), -(half * e2.dot(&back)));
         let (dx, dy) = (half * e1.dot(&over), half * e2.dot(&over));
         let (rx, ry, rz) = (e1.dot(&warp), e2.dot(&warp), e3.dot(&warp));
@@ -73,10 +77,12 @@ impl<L: Lane> Geometry<L> {
         let even = quarter * area;
         let (across, along) = (dy.neg_mul_add(rx, dx * ry), ty.neg_mul_add(rx, tx * ry));
         let least = L::splat(4.0) * (even - across.max_magnitude(along));
+        let least = L::select(is_triangle, twice_area, least);
         // With `volume` over that product a fiber is this part of the corner's gradient, less the mean of all.
-        let volume = area * rz;
-        let first = volume / across.neg_mul_add(across, even * even);
-        let second = volume / along.neg_mul_add(along, even * even);
+        // A triangle is flat: its fibers are its normal.
+        let volume = L::select(is_triangle, L::splat(0.0), area * rz);
+        let product = |between: L| L::select(is_triangle, one, between.neg_mul_add(between, even * even));
+        let (first, second) = (volume / product(across), volume / product(along));
         let parts = [
             -(first * (even + across)),
             second * (even - along),
