@@ -1,6 +1,8 @@
 //! Parts whose nodes move as one.
 
 use mechanics::{
+    constraint::Constraint,
+    load::Drive,
     material::Material,
     rigid::{Body, shape},
 };
@@ -12,6 +14,9 @@ use super::{
     region,
 };
 use crate::{log::Log, typed::condition::Rigid};
+use held::Held;
+
+mod held;
 
 /// A rigid body and what it is given.
 pub(super) struct RigidDraft<'d> {
@@ -125,21 +130,12 @@ pub(super) fn make(
                 ),
             );
         }
+        let mut first_held = None;
         for &n in &given.all_nodes(&assembly.mesh) {
             let id = assembly.mesh.node_ids[n as usize];
             let held = conditions.constraints[conditions.constraint[n as usize] as usize];
-            let prescribed = held.velocity.iter().any(Option::is_some) || held.circle.is_some();
-            if prescribed || held.clamped != 0 || held.walls != 0 {
-                log.fault(
-                    at,
-                    format!("{title} with node {id}, which a boundary or a wall holds"),
-                    "nodes that move as the body does",
-                    log.say(
-                        "take them out of the boundary or wall; velocity and spin of [[rigid]] hold the body",
-                        "take them out of the boundary or wall; CON1 and CON2 of *MAT_RIGID hold the body",
-                    ),
-                );
-                break;
+            if !is_free(&held) && first_held.is_none() {
+                first_held = Some(id);
             }
             // Of bodies with a common part that was reported.
             let apart = |other: &usize| !drafts[*other].given.parts.iter().any(|p| given.parts.contains(p));
@@ -159,14 +155,44 @@ pub(super) fn make(
         if log.count() > 0 {
             continue;
         }
-        let made = shape::body(
-            &assembly.mesh,
-            materials,
-            (&conditions.constraints, &conditions.constraint),
-            &conditions.loads,
-            given.clone(),
-            &mut assembly.velocity,
-        );
+        let mut make = |given: shape::Given| {
+            shape::body(
+                &assembly.mesh,
+                materials,
+                (&conditions.constraints, &conditions.constraint),
+                &conditions.loads,
+                given,
+                &mut assembly.velocity,
+            )
+        };
+        let mut made = make(given.clone());
+        if let (Some(id), Ok(body)) = (first_held, &made) {
+            let Some(held) = given_with_supports(given, body, conditions) else {
+                log.fault(
+                    at,
+                    format!("{title} with node {id}, which a boundary or a wall holds"),
+                    "nodes that move as the body does, or supports that hold it along or about axes",
+                    log.say(
+                        "take them out of the boundary or wall; velocity and spin of [[rigid]] hold the body",
+                        "take them out of the boundary or wall; CON1 and CON2 of *MAT_RIGID hold the body",
+                    ),
+                );
+                continue;
+            };
+            let kept = |drives: &[Option<Drive>; 3]| {
+                let axes = drives.iter().zip(["x", "y", "z"]);
+                axes.filter(|(drive, _)| **drive == HOLD).map(|(_, axis)| axis).collect::<Vec<_>>().join(", ")
+            };
+            log.warn(
+                at,
+                format!(
+                    "{title}: what holds nodes of it holds the body, along [{}] and about [{}] of its centre",
+                    kept(&held.velocity),
+                    kept(&held.spin)
+                ),
+            );
+            made = make(held);
+        }
         match made {
             Ok(body) => {
                 turn(assembly, &body);
@@ -191,6 +217,35 @@ pub(super) fn make(
         }
     }
     bodies
+}
+
+/// The velocity of what is held.
+const HOLD: Option<Drive> = Some(Drive::constant(0.0));
+
+/// Whether nothing holds or moves a node.
+fn is_free(by: &Constraint) -> bool {
+    by.velocity == [None; 3] && by.circle.is_none() && by.clamped == 0 && by.walls == 0
+}
+
+/// What a body is given, and what supports of its nodes hold of it; none where they do more than hold, or another motion is given there.
+fn given_with_supports(given: &shape::Given, body: &Body, conditions: &Conditions) -> Option<shape::Given> {
+    let reach = body.places.iter().flatten().fold(f64::MIN_POSITIVE, |reach, c| reach.max(c.abs()));
+    let mut held = Held::default();
+    for (&n, place) in body.nodes.iter().zip(&body.places) {
+        let by = &conditions.constraints[conditions.constraint[n as usize] as usize];
+        if !is_free(by) && !held.take(by, place.map(|c| c / reach)) {
+            return None;
+        }
+    }
+    let axes = held.axes()?;
+    let mut given = given.clone();
+    for (drive, _) in given.velocity.iter_mut().chain(&mut given.spin).zip(axes).filter(|(_, held)| *held) {
+        if drive.is_some_and(|other| Some(other) != HOLD) || given.circle.is_some() {
+            return None;
+        }
+        *drive = HOLD;
+    }
+    Some(given)
 }
 
 /// Lets the nodes of a body turn at the start as it does; only those of shells ever use it.

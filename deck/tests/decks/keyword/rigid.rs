@@ -216,9 +216,34 @@ fn what_cannot_be_honoured_of_rigid_bodies_is_refused_at_its_line() {
         let told = found.iter().any(|f| f.starts_with(&format!("{line}: ")) && f.contains(expected));
         assert!(told, "{more}{found:?}");
     }
-    // The nodes of a body are not held one by one.
+    // What holds one corner along an axis ties the body's turns to its motion.
     let found = faults(ELASTIC, "*BOUNDARY_SPC_NODE\n11,0,1\n");
     assert!(found[0].contains("with node 11, which a boundary or a wall holds"), "{found:?}");
+}
+
+#[test]
+fn supports_of_the_nodes_of_a_body_hold_the_body_where_that_is_what_they_say() {
+    let set = "*SET_NODE_LIST\n9\n11,12,13,14,15,16,17,18\n";
+    let held = |body: usize, more: &str| {
+        let reading = whole(ELASTIC, more);
+        let body = &reading.model.setup.bodies[body];
+        let words: Vec<String> = reading.warnings.iter().map(|w| w.words.clone()).collect();
+        ([body.velocity, body.spin].map(|drives| drives.map(|drive| drive.is_some())), words)
+    };
+    // All along x and y: it may fall along z, and does not turn.
+    let (axes, words) = held(1, &format!("{set}*BOUNDARY_SPC_SET\n9,0,1,1\n"));
+    assert_eq!(axes, [[true, true, false], [true; 3]]);
+    let told = "the rigid body of part 4: what holds nodes of it holds the body, along [x, y] and about [x, y, z] of its centre";
+    assert!(words.iter().any(|w| w == told), "{words:?}");
+    // Two nodes of a sheet that neither move nor turn hold all of it.
+    let (axes, _) = held(0, "*BOUNDARY_SPC_NODE\n1,0,1,1,1,1,1,1\n2,0,1,1,1,1,1,1\n");
+    assert_eq!(axes, [[true; 3], [true; 3]]);
+    // A motion of the body along an axis that its nodes hold is refused.
+    let both = format!(
+        "{set}*BOUNDARY_SPC_SET\n9,0,0,0,1\n*DEFINE_CURVE\n3\n0,1\n1,1\n*BOUNDARY_PRESCRIBED_MOTION_RIGID\n4,3,0,3\n"
+    );
+    let found = faults(ELASTIC, &both);
+    assert!(found.iter().any(|f| f.contains("with node 11, which a boundary or a wall holds")), "{found:?}");
 }
 
 #[test]
