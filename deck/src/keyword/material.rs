@@ -59,6 +59,8 @@ pub(super) enum Law {
         rate0: f64,
         specific_heat: f64,
         damage: Option<[f64; 5]>,
+        /// Young's modulus and Poisson's ratio of shells, which need no equation of state with them.
+        of_shells: Option<(f64, f64)>,
     },
     /// A strength that our declared laws have, beside an equation of state of the deck.
     Strength(Strength),
@@ -249,6 +251,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
                 rate0: Some(f[1].real(7, 1.0)).filter(|r| *r > 0.0).unwrap_or(1.0),
                 specific_heat: COLD_HEAT,
                 damage: None,
+                of_shells: None,
             });
             (elastic, law)
         }
@@ -409,6 +412,7 @@ fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool) -> Option<Law> {
         rate0: Some(f[1].real(7, 1.0)).filter(|r| *r > 0.0).unwrap_or(1.0),
         specific_heat: if warm { heat } else { COLD_HEAT },
         damage: d.iter().any(|d| *d != 0.0).then_some(d),
+        of_shells: (young > 0.0 && -1.0 < poisson && poisson < 0.5).then_some((young, poisson)),
     })
 }
 

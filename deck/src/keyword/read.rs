@@ -1,7 +1,7 @@
 //! Blocks of cards become a problem: this knows every keyword. What is read and cannot be honoured is a fault at its line;
 //! what changes nothing here goes into one warning.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     beam,
@@ -38,7 +38,7 @@ pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
     let mut blocks = std::mem::take(&mut lines.blocks);
     let context = Context { log, parameters: &lines.parameters };
     // Coordinate systems may name nodes, whatever stands first.
-    let mut later = Vec::new();
+    let (mut later, mut materials) = (Vec::new(), Vec::new());
     blocks.iter().filter(|block| block.keyword.starts_with("DEFINE_VECTOR")).for_each(|block| {
         define::read_vectors(&mut problem, block, &context);
     });
@@ -51,10 +51,13 @@ pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
         }
         if block.keyword.starts_with("DEFINE_COORDINATE_NODES") {
             later.push(block);
+        } else if is_material(&block.keyword) {
+            materials.push(block);
         } else {
             keyword(&mut problem, block, &context);
         }
     }
+    read_materials(&mut problem, materials, &context);
     for block in later {
         keyword(&mut problem, block, &context);
     }
@@ -172,7 +175,6 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         word if RigidCards::knows(word) => problem.rigid.read(block, &problem.vectors, context),
         word if joint::knows(word) => joint::read(&mut problem.joints, block, context),
         word if word.starts_with("SET_") => problem.sets.read(block, context),
-        word if word.starts_with("MAT_") => read_material(problem, block, context),
         word if word.starts_with("EOS_") => read_eos(problem, block, context),
         word if word.starts_with("CONTACT_FORCE_TRANSDUCER") => {
             problem.transducers.extend(ContactCard::read_transducer(block, context));
@@ -194,11 +196,42 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
     }
 }
 
+fn is_material(word: &str) -> bool {
+    word.starts_with("MAT_") && !word.starts_with("MAT_ADD_EROSION") && !word.starts_with("MAT_000")
+}
+
+/// Reads the `*MAT_` keywords of materials that parts have, once all parts are known. Of others nothing depends on what they say.
+fn read_materials(problem: &mut Problem, blocks: Vec<&mut Block<'_>>, context: &Context<'_>) {
+    let of_parts: BTreeSet<u32> = problem.parts.values().map(|part| part.material.value).collect();
+    let mut unused = Vec::new();
+    for block in blocks {
+        if context.log.is_given_up() {
+            return;
+        }
+        take_headings(block);
+        let head = block.card(0);
+        let id = context.fields(&head, block.width, &TENS).id(0);
+        if of_parts.contains(&id) || of_parts.is_empty() {
+            read_material(problem, block, context, id);
+        } else {
+            unused.push((block.at, format!("*{} {id}", context.log.quote(&block.keyword))));
+        }
+    }
+    if let Some((first, _)) = unused.first() {
+        const LISTED: usize = 10;
+        let mut names: Vec<&str> = unused.iter().take(LISTED).map(|(_, name)| name.as_str()).collect();
+        let more = format!("{} more", unused.len() - names.len());
+        if unused.len() > LISTED {
+            names.push(&more);
+        }
+        context.log.warn(*first, format!("materials that no part has are left out: {}", names.join(", ")));
+    }
+}
+
 /// Reads a `*MAT_` keyword.
-fn read_material(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
+fn read_material(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>, id: u32) {
     let head = block.card(0);
     let f = context.fields(&head, block.width, &TENS);
-    let id = f.id(0);
     let Some(card) = material::read(block, context) else {
         problem.refused_materials.insert(id);
         return;

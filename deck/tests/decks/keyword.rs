@@ -480,11 +480,14 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
         ("*MAT_ADD_EROSION\n1\n\n1\n", "a.k:25:1: read 1; expected IDAM blank: damage models"),
         ("*MAT_ADD_EROSION\n1,,1.0,,,,,2\n", "a.k:23:12: read 2; expected NCS 0 or 1"),
         (
-            "*MAT_PLASTIC_KINEMATIC\n2,7.85e-9,2.1e5,0.3,300.\n,,-0.8\n",
-            "a.k:24:3: read -0.8; expected a failure strain of 0 or above",
+            "*PART\nmore\n2,1,2\n*MAT_PLASTIC_KINEMATIC\n2,7.85e-9,2.1e5,0.3,300.\n,,-0.8\n",
+            "a.k:27:3: read -0.8; expected a failure strain of 0 or above",
         ),
         ("*CONTROL_CONTACT\n,,,,,,,3\n", "a.k:23:8: read 3; expected ENMASS 0, 1 or 2"),
-        ("*MAT_SEATBELT\n2,1.0\n", "a.k:22:1: read *MAT_SEATBELT; expected a material of the table"),
+        (
+            "*PART\nmore\n2,1,2\n*MAT_SEATBELT\n2,1.0\n",
+            "a.k:25:1: read *MAT_SEATBELT; expected a material of the table",
+        ),
         (
             "*ELEMENT_DISCRETE\n1,1,1,2,3\n",
             "a.k:22:1: read *ELEMENT_DISCRETE; expected a keyword of the table",

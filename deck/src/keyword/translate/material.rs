@@ -12,7 +12,7 @@ use crate::{
     keyword::{
         explosive::Jwl,
         material::{EosCard, Law, MaterialCard},
-        problem::PartCard,
+        problem::{PartCard, Section},
     },
     library::{Clash, clashes},
     log::Log,
@@ -139,7 +139,12 @@ fn eos_of(
         }
         _ => {}
     }
-    match (eos, material.elastic) {
+    let is_of_shells = matches!(t.problem.sections.get(&part.section.value), Some((_, Section::Shell(_))));
+    let elastic = match material.law {
+        Law::JohnsonCook { of_shells, .. } if is_of_shells => material.elastic.or(of_shells),
+        _ => material.elastic,
+    };
+    match (eos, elastic) {
         // Told above.
         (Some(EosCard::Jwl(_)), _) => None,
         (Some(EosCard::Grueneisen { c, s, gamma }), _) => {

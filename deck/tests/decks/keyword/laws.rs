@@ -522,3 +522,37 @@ fn a_tabulated_pressure_has_points_or_curves_by_the_logarithm_of_the_volume() {
         fault_of(&table("1,1.5", &points.replace("-0.1,-0.3", "-0.1,-0.1"))).contains("different volumes")
     );
 }
+
+#[test]
+fn johnson_cook_of_shells_needs_no_equation_of_state_where_it_has_moduli() {
+    let sheet = |moduli: &str| {
+        format!(
+            "*KEYWORD\n*CONTROL_TERMINATION\n1e-6\n*PART\nsheet\n1,1,1\n*SECTION_SHELL\n1,2\n1,1,1,1\n\
+             *MAT_JOHNSON_COOK\n1,7.83e-9,{moduli}\n792,510,0.26,0.014,1.03,1793,293,1\n4.77e8\n\n\
+             *NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n*ELEMENT_SHELL\n1,1,1,2,3,4\n*END\n"
+        )
+    };
+    let steel = of_deck(&sheet("8e4,2.08e5,0.3"));
+    let Eos::Linear { bulk } = steel.eos else { panic!("{steel:?}") };
+    assert!((bulk / (2.08e5 / 1.2) - 1.0).abs() < 1e-12, "{bulk}");
+    assert!(matches!(steel.strength, Strength::JohnsonCook { shear: 8e4, .. }), "{steel:?}");
+    assert!(fault_of(&sheet("8e4")).contains("needs an equation of state"));
+    // A solid needs one whatever moduli it has.
+    let solid = "*MAT_JOHNSON_COOK\n1,7.83e-9,8e4,2.08e5,0.3\n792,510,0.26,0.014,1.03,1793,293,1\n4.77e8\n\n";
+    assert!(fault(solid).contains("needs an equation of state"));
+}
+
+#[test]
+fn materials_that_no_part_has_are_left_out_whatever_they_are() {
+    let card =
+        "*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n*MAT_HILL_3R\n7,7e-9,x\n*MAT_ELASTIC_TITLE\nspare\n8,0,-1\n";
+    let reading = deck::read_whole(&cube(card, ""), "a.k").unwrap_or_else(|faults| panic!("{faults:#?}"));
+    assert_eq!(reading.model.setup.materials.len(), 1);
+    let words: Vec<&str> = reading.warnings.iter().map(|w| w.words.as_str()).collect();
+    let told = "materials that no part has are left out: *MAT_HILL_3R 7, *MAT_ELASTIC 8";
+    assert!(words.contains(&told), "{words:?}");
+    assert!(
+        fault(&card.replace("7,7e-9", "1,7e-9"))
+            .contains("read *MAT_HILL_3R; expected a material of the table")
+    );
+}
