@@ -36,7 +36,7 @@ pub(super) fn a_blunt_projectile_goes_through_steel_from_the_measured_velocity_o
         let nose = |row: &master::results::history::HistoryRow| row.gauges[0].x[2];
         let way = nose(&solved.rows[0]) - nose(solved.rows.last().expect("rows"));
         figures.add(
-            &format!("blunt projectile, {words} its limit: way of the nose over the thickness"),
+            &format!("blunt projectile @ {words} its limit, way of the nose over the thickness"),
             way / PLATE,
         );
     }
@@ -46,10 +46,10 @@ pub(super) fn an_ogive_keeps_of_its_velocity_what_it_kept_behind_a_slab_of_concr
     for velocity in [606.0, 749.0, 1058.0] {
         let solved = at("studies/ogive-through-concrete.toml", velocity);
         figures.add(
-            &format!("ogive through concrete at {velocity} m/s: residual velocity (m/s)"),
+            &format!("ogive through concrete @ {velocity} m/s, residual velocity (m/s)"),
             velocity * left_of_the_velocity(&solved),
         );
         let error = solved.rows.last().expect("rows").error;
-        figures.add(&format!("ogive through concrete at {velocity} m/s: energy error"), error);
+        figures.add(&format!("ogive through concrete @ {velocity} m/s, energy error"), error);
     }
 }

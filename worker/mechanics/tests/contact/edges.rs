@@ -153,7 +153,7 @@ fn a_sheet_that_was_flat_meets_itself_where_it_has_folded() {
         assert_eq!(vote.hits, u64::from(edges), "no node is in a zone");
         // K h of both, half of it by the factor of the settings; beyond half a gap the spring hardens.
         let depth = gap - apart;
-        let hardened = depth + 64.0 / gap * (depth - 0.5 * gap).powi(2);
+        let hardened = depth + 16.0 / gap * (depth - 0.5 * gap).powi(2);
         let push = if edges { 0.5 * 0.1 * hardened } else { 0.0 };
         for (nodes, sign) in [(0..6, -1.0), (6..12, 1.0)] {
             let sum = [0, 1, 2].map(|a| world.f[a][nodes.clone()].iter().sum::<f64>());

@@ -25,11 +25,11 @@ fn the_vote_of_a_pair_is_its_spring_between_both_masses() {
     world.place(probe, [0.5, 0.5, 1.04]);
     let vote = world.forces(1.0);
     assert!((vote.worst_depth - 0.6).abs() < 1e-12);
-    // A hundredth beyond half a gap: the spring hardens by 640 times its square.
-    let (force, energy) = (0.06 + 640.0 * 1e-4, 0.5 * 0.06 * 0.06 + 640.0 * 1e-6 / 3.0);
+    // A hundredth beyond half a gap: the spring hardens by 160 times its square.
+    let (force, energy) = (0.06 + 160.0 * 1e-4, 0.5 * 0.06 * 0.06 + 160.0 * 1e-6 / 3.0);
     assert!((vote.energy - 0.5 * energy).abs() < 1e-15, "{}", vote.energy);
     assert!((vote.force_bound - 0.5 * force).abs() < 1e-14, "{}", vote.force_bound);
-    let expected = expected / (1.0_f64 + 1280.0 * 0.01).sqrt();
+    let expected = expected / (1.0_f64 + 320.0 * 0.01).sqrt();
     assert!((vote.dt - expected).abs() < 1e-14, "{} for {expected}", vote.dt);
 }
 

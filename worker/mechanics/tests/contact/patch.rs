@@ -13,7 +13,7 @@ fn norm(v: [f64; 3]) -> f64 {
 
 /// Force of a spring with a gap of 0.1, which hardens beyond half of it.
 fn pushed(k: f64, depth: f64) -> f64 {
-    k * (depth + 640.0 * (depth - 0.05).powi(2))
+    k * (depth + 160.0 * (depth - 0.05).powi(2))
 }
 
 #[test]

@@ -12,8 +12,8 @@ use crate::lanes::{Lane, scalar::Scalar};
 /// Depth (gaps) from which the spring hardens.
 const FROM: f64 = 0.5;
 
-/// How fast it does: at 0.9 gap its force is 12 times that of the linear spring, its energy 4.4 times.
-const GROWTH: f64 = 64.0;
+/// How fast it does: at 0.9 gap its force is 3.8 times that of the linear spring, its energy 1.8 times.
+const GROWTH: f64 = 16.0;
 
 /// Where and how fast springs harden, of a gap.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -105,10 +105,10 @@ mod tests {
     }
 
     #[test]
-    fn near_the_depth_at_which_a_run_ends_it_pushes_twelve_times_as_hard() {
+    fn near_the_depth_at_which_a_run_ends_it_pushes_almost_four_times_as_hard() {
         let deep = Hardening::of(1.0).spring_of_one(1.0, 0.9);
         assert!(
-            (deep.force - 11.14).abs() < 1e-12 && (deep.energy - (0.405 + 4.096 / 3.0)).abs() < 1e-12,
+            (deep.force - 3.46).abs() < 1e-12 && (deep.energy - (0.405 + 1.024 / 3.0)).abs() < 1e-12,
             "{deep:?}"
         );
     }
