@@ -93,16 +93,20 @@ pub(super) fn read_mesh(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
         is
     });
     if let Some(first) = left_out.values().min() {
-        const LISTED: usize = 30;
-        let names =
-            left_out.iter().take(LISTED).map(|(name, at)| format!("{name} ({})", log.line(*at, *first)));
-        let mut names: Vec<String> = names.collect();
-        if left_out.len() > LISTED {
-            names.push(format!("{} more", left_out.len() - LISTED));
-        }
-        log.warn(*first, format!("left out, as only the mesh is taken over: {}", names.join(", ")));
+        let names = left_out.iter().map(|(name, at)| format!("{name} ({})", log.line(*at, *first)));
+        log.warn(*first, format!("left out, as only the mesh is taken over: {}", first_of(30, names)));
     }
     read(lines, log)
+}
+
+/// The first `most` names in a row, and how many more there are.
+fn first_of(most: usize, names: impl ExactSizeIterator<Item = String>) -> String {
+    let more = names.len().saturating_sub(most);
+    let mut listed: Vec<String> = names.take(most).collect();
+    if more > 0 {
+        listed.push(format!("{more} more"));
+    }
+    listed.join(", ")
 }
 
 /// Takes the headings of `_TITLE` out of a block.
@@ -218,13 +222,8 @@ fn read_materials(problem: &mut Problem, blocks: Vec<&mut Block<'_>>, context: &
         }
     }
     if let Some((first, _)) = unused.first() {
-        const LISTED: usize = 10;
-        let mut names: Vec<&str> = unused.iter().take(LISTED).map(|(_, name)| name.as_str()).collect();
-        let more = format!("{} more", unused.len() - names.len());
-        if unused.len() > LISTED {
-            names.push(&more);
-        }
-        context.log.warn(*first, format!("materials that no part has are left out: {}", names.join(", ")));
+        let names = unused.iter().map(|(_, name)| name.clone());
+        context.log.warn(*first, format!("materials that no part has are left out: {}", first_of(10, names)));
     }
 }
 

@@ -51,8 +51,7 @@ pub(crate) fn faces_of(block: &Block, loads: &Loads, material: &Material) -> Vec
     let mut local: Vec<(u32, u32)> = block.globals().zip(0..).collect();
     local.sort_unstable();
     let find = |element: u32| local.binary_search_by_key(&element, |l| l.0).ok().map(|i| local[i].1 as usize);
-    let stiffness = material.wave_modulus();
-    let longitudinal = (stiffness / material.density).sqrt();
+    let longitudinal = material.sound_speed();
     let shear = (material.shear() / material.density).sqrt();
     let impedance = [material.density * longitudinal, material.density * shear, longitudinal];
     let mut found: Vec<(usize, LoadedFace)> = Vec::new();

@@ -202,8 +202,7 @@ impl Group for Solids {
         // The damage that the last step left chose the coefficient of that step.
         let viscous =
             if state(DAMAGE) >= 1.0 { self.control.of_failed(material) } else { self.control.of_whole() };
-        let stiffness = material.wave_modulus();
-        let sound = (stiffness / material.density).sqrt();
+        let sound = material.sound_speed();
         let leaving = Leaving {
             x: at(x),
             v: at(v),
