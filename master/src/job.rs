@@ -15,6 +15,7 @@ mod collect;
 mod deal;
 mod epoch;
 mod error;
+mod foresight;
 mod frames;
 mod numbers;
 mod problem;
@@ -50,6 +51,7 @@ use checkpoints::Checkpoints;
 use epoch::Epoch;
 use error::Breach;
 pub use error::Error;
+use foresight::Window;
 use frames::{Frame, Frames};
 use numbers::not_a_number;
 use problem::Problem;
@@ -320,7 +322,8 @@ impl Job {
             if let Some(fault) = vote.fault {
                 return Err(Error::Element(element_fault(problem, fault, 0)));
             }
-            let (dt, _, _) = allowed(&problem.model, walls, vote);
+            let window = Window { known: None, from: start.time, longest: control.end_time - start.time };
+            let (dt, _, _) = allowed(problem, walls, vote, window);
             Ok(first_share(vote) * dt)
         })?;
         let at_end = time >= control.end_time || first >= control.end_cycle;
@@ -530,7 +533,8 @@ impl Job {
         }
         let control = self.model().setup.control;
         let walls = &self.account.walls;
-        let (dt, limit, element) = step_after(&self.problem.model, walls, &vote, now.dt);
+        let known = cycle.checked_sub(1).and_then(|before| Some(self.epoch.schedule.step(before)?.dt));
+        let (dt, limit, element) = step_after(&self.problem, walls, &vote, (known, now));
         let next = self.epoch.schedule.order_after(cycle, now, (dt, limit), &control);
         self.account.check_floor(&self.problem, (cycle + 1, next.dt), next.limit, element);
         self.epoch.schedule.rescale(&vote)?;

@@ -206,3 +206,40 @@ fn bodies_of_nodes_spans_and_masses_are_the_same_bits_on_any_workers() {
     model.setup.control.end_cycle = 60;
     same_bits(&model);
 }
+
+/// The time step foresees a motion that begins at full speed, and the quiet time before keeps its long steps.
+#[test]
+fn a_prescribed_motion_that_jumps_keeps_to_the_travel_of_contact() {
+    let boundary = "[[boundary]]\nparts = [\"high\"]\ntype = \"velocity\"\nvelocity = { z = { curve = \"jump\", factor = -500 } }\n\
+                    [[curve]]\nname = \"jump\"\npoints = [[0, 0], [9.99999e-6, 0], [1e-5, 1], [1, 1]]\n";
+    let span =
+        "[[boundary]]\nparts = [\"high\"]\ntype = \"velocity\"\nvelocity = { z = -500 }\nfrom = 1e-5\n";
+    let turn = "[[boundary]]\nparts = [\"high\"]\ntype = \"rotation\"\naxis = \"y\"\npoint = [1.005, 0, 0]\nrate = -500\nfrom = 1e-5\n";
+    let rigid = boundary
+        .replace("[[boundary]]\nparts = [\"high\"]\ntype = \"velocity\"", "[[rigid]]\nparts = [\"high\"]");
+    for (rest, jumps) in [(boundary, true), (&rigid, true), (span, true), (turn, true), ("", false)] {
+        let high = part("high", 0.0, 0.0).replace("[0e0, 0, 0], size", "[0, 0, 0.015], size");
+        let parts = format!("{}{high}", part("low", 0.0, 0.0));
+        let model = cubes(1.4e-5, &parts, &format!("[contact]\ngap_fraction = 0.1\n{rest}"));
+        let solved = run(model);
+        let travel = solved.outcome.run_totals.worst_gap_travel;
+        let quiet = longest_step(&solved);
+        let last = solved.rows.iter().rev().nth(1).expect("rows").dt;
+        let steady =
+            solved.rows.iter().filter(|row| row.time < 9e-6).map(|row| row.dt).fold(f64::MAX, f64::min);
+        assert!(travel < 0.2 && (travel > 0.15) == jumps, "{travel}: {rest}");
+        assert!(!jumps || last < 0.6 * quiet, "{last:e} after, {quiet:e} before");
+        assert!(steady > 0.99 * quiet, "{steady:e}, {quiet:e}: {rest}");
+    }
+}
+
+#[test]
+fn steps_that_foresee_a_motion_are_the_same_bits_on_any_workers_and_after_a_checkpoint() {
+    let rest = "[contact]\ngap_fraction = 0.1\n[[boundary]]\nparts = [\"high\"]\ntype = \"velocity\"\n\
+                velocity = { x = { curve = \"swell\", factor = 300 }, z = { curve = \"swell\", factor = -60 } }\n\
+                [[curve]]\nname = \"swell\"\npoints = [[0, 0], [1e-6, 0.3], [4e-6, 1], [4.1e-6, 0.01], [9e-6, 3], [1, 3]]\n";
+    let high = part("high", 0.0, 0.0).replace("[0e0, 0, 0], size", "[0, 0, 0.0106], size");
+    let mut model = cubes(1.0, &format!("{}{high}", part("low", 0.0, 0.0)), rest);
+    model.setup.control.end_cycle = 100;
+    same_bits(&model);
+}

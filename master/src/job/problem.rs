@@ -10,7 +10,10 @@ use mechanics::{
     state::GlobalState,
 };
 
-use super::error::{Error, Overlap, TooNear};
+use super::{
+    error::{Error, Overlap, TooNear},
+    foresight::Foresight,
+};
 use crate::erosion;
 
 /// What a job computes.
@@ -29,6 +32,8 @@ pub(super) struct Problem {
 pub(super) struct Touching {
     pub(super) surface: Arc<Surface>,
     pub(super) exclusions: Arc<Exclusions>,
+    /// Motions that need no force to become fast.
+    pub(super) foresight: Foresight,
 }
 
 impl Problem {
@@ -49,7 +54,7 @@ impl Problem {
         if setup != model.setup {
             Arc::make_mut(&mut model).setup = setup;
         }
-        let touching = Touching::of(&model)?;
+        let touching = Touching::of(&model, &start)?;
         let sum = sum_of(&model)?;
         Ok((Self { model, quanta, touching, sum }, start))
     }
@@ -72,7 +77,7 @@ fn sum_of(model: &Model) -> Result<[u8; 32], Error> {
 
 impl Touching {
     /// None without contact.
-    fn of(model: &Model) -> Result<Option<Self>, Error> {
+    fn of(model: &Model, start: &GlobalState) -> Result<Option<Self>, Error> {
         let Some(settings) = &model.setup.contact else { return Ok(None) };
         let surface = erosion::surface(model, &|_| true);
         let at_start: Vec<[f64; 3]> =
@@ -92,7 +97,8 @@ impl Touching {
             refuse_crossing(model, &surface, &crossing, settings)?;
         }
         let exclusions = Arc::new(exclusions.with_edges(&surface, &crossing));
-        Ok(Some(Self { surface: Arc::new(surface), exclusions }))
+        let foresight = Foresight::of(&model.setup, start, &surface);
+        Ok(Some(Self { surface: Arc::new(surface), exclusions, foresight }))
     }
 }
 

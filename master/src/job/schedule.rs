@@ -4,7 +4,6 @@
 
 use std::collections::BTreeMap;
 
-use deck::model::Model;
 use mechanics::{
     exact::Quantum,
     setup::{Control, Setup},
@@ -12,11 +11,13 @@ use mechanics::{
     wall::{Motion, Pose},
 };
 
-use super::{checkpoints::Checkpoint, error::Error};
+use super::{checkpoints::Checkpoint, error::Error, foresight::Window, problem::Problem};
 use crate::event::Limit;
 
 /// Share of the gap that contact votes for per cycle; the lag may not take it past 20 %.
 const TRAVEL_VOTE: f64 = 0.16;
+/// Share of the gap that prescribed motions may travel in a cycle: the step that they have it in is ordered now, so no lag adds to it.
+const TRAVEL_PRESCRIBED: f64 = 0.19;
 /// A step grows where its limits are longer than it by this factor. Limits follow the strains of elements, so a step that followed every
 /// rise of theirs would breathe with a body's vibration, two cycles late, and pump what nothing damps: shells.
 const ROOM_TO_GROW: f64 = 1.01;
@@ -243,15 +244,22 @@ pub(super) fn first_share(vote: &Vote) -> f64 {
     if vote.parts.iter().any(|part| part.internal > 0.0) { START } else { 1.0 }
 }
 
-/// The step after one of `before`, what limits it, and the element if one does.
+/// The step after `before`, what limits it, and the element if one does; `known` is the length of the step of the vote, the one before
+/// that. Its middle is counted from the end of it, a time that a checkpoint has to the bit.
 pub(super) fn step_after(
-    model: &Model,
+    problem: &Problem,
     walls: &[Pose],
     vote: &Vote,
-    before: f64,
+    (known, before): (Option<f64>, Step),
 ) -> (f64, Limit, Option<u32>) {
-    let (allowed, limit, element) = allowed(model, walls, vote);
-    let grown = model.setup.control.growth * before;
+    let grown = problem.model.setup.control.growth * before.dt;
+    let window = Window {
+        known: known.map(|dt| 0.5f64.mul_add(-dt, before.time)),
+        from: before.time + before.dt,
+        longest: grown,
+    };
+    let (allowed, limit, element) = allowed(problem, walls, vote, window);
+    let before = before.dt;
     if before < allowed && allowed < ROOM_TO_GROW * before {
         (before, limit, element)
     } else if grown < allowed {
@@ -262,22 +270,36 @@ pub(super) fn step_after(
 }
 
 /// The step that a vote allows, what limits it, and the element if one does.
-pub(super) fn allowed(model: &Model, walls: &[Pose], vote: &Vote) -> (f64, Limit, Option<u32>) {
-    let setup = &model.setup;
+pub(super) fn allowed(
+    problem: &Problem,
+    walls: &[Pose],
+    vote: &Vote,
+    window: Window,
+) -> (f64, Limit, Option<u32>) {
+    let setup = &problem.model.setup;
     let mut best = (f64::INFINITY, Limit::Growth, None);
     let mut offer = |dt: f64, limit: Limit, element: Option<u32>| {
         if dt < best.0 {
             best = (dt, limit, element);
         }
+        best.0
     };
     offer(setup.control.safety_factor * vote.courant, Limit::Courant, Some(vote.courant_element));
     offer(vote.volume_limit, Limit::Volume, None);
-    offer(vote.contact_limit, Limit::Contact, None);
-    if let Some(contact) = &setup.contact {
+    let mut longest = offer(vote.contact_limit, Limit::Contact, None);
+    if let (Some(contact), Some(touching)) = (&setup.contact, &problem.touching) {
         // A wall may bring a node to its own speed within a cycle.
         let speed = vote.contact_speed_ahead.max(wall_speed(setup, walls));
         if speed > 0.0 {
-            offer(TRAVEL_VOTE * contact.gap / speed, Limit::Travel, None);
+            longest = offer(TRAVEL_VOTE * contact.gap / speed, Limit::Travel, None);
+        }
+        let window = Window { longest: longest.min(window.longest), ..window };
+        let ahead = vote.contact_speed_ahead;
+        match touching.foresight.speed(&setup.loads.curves, window, ahead) {
+            Some(speed) if speed > 0.0 => {
+                offer(TRAVEL_PRESCRIBED * contact.gap / speed, Limit::Travel, None);
+            }
+            _ => {}
         }
     }
     best

@@ -50,6 +50,13 @@ impl Curve {
         ((time - from[0]) * 0.5).mul_add(from[1] + self.at(time), sum)
     }
 
+    /// The least and the greatest value from a time on until another.
+    pub fn range(&self, from: f64, until: f64) -> [f64; 2] {
+        let ends = [self.at(from), self.at(until)];
+        let inside = self.points.iter().filter(|p| from < p[0] && p[0] < until).map(|p| p[1]);
+        inside.fold([ends[0].min(ends[1]), ends[0].max(ends[1])], |[low, high], y| [low.min(y), high.max(y)])
+    }
+
     /// The greatest magnitude.
     pub fn greatest(&self) -> f64 {
         self.points.iter().map(|p| p[1].abs()).fold(0.0, f64::max)
@@ -124,6 +131,20 @@ impl Drive {
     /// If there is no such curve.
     pub fn prescribed(&self, curves: &[Curve], time: f64) -> Option<f64> {
         self.acts(time).then(|| self.at(curves, time))
+    }
+
+    /// The least and the greatest value from a time on until another, of the times at which it acts; none if it acts at none.
+    ///
+    /// # Panics
+    /// If there is no such curve.
+    pub fn range(&self, curves: &[Curve], from: f64, until: f64) -> Option<[f64; 2]> {
+        let (from, until) = (from.max(self.span.from), until.min(self.span.until));
+        let [low, high] = match self.curve {
+            _ if from > until => return None,
+            Some(c) => curves[c as usize].range(from, until).map(|y| self.factor * y),
+            None => [self.factor; 2],
+        };
+        Some([low.min(high), low.max(high)])
     }
 
     /// The integral from zero to a time, over the times at which it acts.
@@ -280,5 +301,12 @@ mod tests {
         let other = Span { from: 3.0, until: 4.0 };
         assert!(drive.span.is_apart_from(&other) && other.is_apart_from(&drive.span));
         assert!(!drive.span.is_apart_from(&Span::ALWAYS));
+        let falling = Drive { factor: -2.0, ..drive };
+        let ranges = [(0.0, 0.5), (0.0, 2.0), (2.0, 9.0), (3.5, 9.0)];
+        assert_eq!(
+            ranges.map(|(from, until)| falling.range(&curves, from, until)),
+            [None, Some([-8.0, -4.0]), Some([-12.0, -8.0]), None]
+        );
+        assert_eq!(curves[0].range(2.0, 3.5), [2.5, 6.0], "a peak between");
     }
 }
