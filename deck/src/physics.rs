@@ -90,15 +90,26 @@ struct Measured {
     step: f64,
 }
 
+/// What contact asks of the first step, in the units of the deck.
+struct Closing {
+    gap: f64,
+    /// At which bodies close in.
+    speed: f64,
+    /// In which that speed travels its share of the gap; infinite at rest.
+    step: f64,
+}
+
 /// Looks at a checked model.
 pub fn forecast(model: &Model) -> Forecast {
     let units = Units::named(&model.units);
     let [length, mass, time] = units.map_or([1.0; 3], |units| units.in_si());
     let measured: Vec<Measured> = (0..model.mesh.parts.len()).map(|p| measure(model, p)).collect();
-    let of_contact = model.setup.contact.as_ref().map_or(f64::INFINITY, |contact| {
+    let contact = model.setup.contact.as_ref().map(|contact| {
         let speeds = closing_speeds(&model.mesh, contact, &model.velocity);
-        TRAVEL * contact.gap / speeds.into_iter().fold(0.0, f64::max)
+        let speed = speeds.into_iter().fold(0.0, f64::max);
+        Closing { gap: contact.gap, speed, step: TRAVEL * contact.gap / speed }
     });
+    let of_contact = contact.as_ref().map_or(f64::INFINITY, |contact| contact.step);
     let step = measured.iter().map(|part| part.step).fold(of_contact, f64::min);
     let end = model.setup.control.end_time;
     let elements = model.mesh.n_elements() as u64;
@@ -126,7 +137,7 @@ pub fn forecast(model: &Model) -> Forecast {
         cycles,
         memory_bytes: OF_RUN.saturating_add(elements.saturating_mul(OF_ELEMENT)),
         thread_s: cycles.map(|cycles| cycles as f64 * elements as f64 * GRIND_NS * 1e-9),
-        warnings: doubts::of(model, &measured, units, cycles),
+        warnings: doubts::of(model, &measured, units, (cycles, contact)),
     }
 }
 

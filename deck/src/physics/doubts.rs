@@ -1,7 +1,7 @@
 //! Doubts: a numbered list of checks, each a sentence that names the part, what it has and what to do.
 //!
 //! 1. density, stiffness, yield stress and speed that no body of this world has: a value in another unit;
-//! 2. a run in which nothing moves, that ends before anything meets, or goes on long after;
+//! 2. a run in which nothing moves, that ends before anything meets, or goes on long after; a gap of contact that makes it long;
 //! 3. bodies that meet without contact, and bodies that meet nothing;
 //! 4. cells too flat, or too coarse for what strikes them;
 //! 5. symmetry planes that a body straddles, or at which it is not held.
@@ -11,7 +11,7 @@ use std::{collections::BTreeSet, ops::RangeInclusive};
 use mechanics::{material::Strength, wall::Motion};
 
 use super::{
-    Measured,
+    Closing, Measured, TRAVEL,
     bodies::{self, Body},
 };
 use crate::{
@@ -35,6 +35,8 @@ const FASTEST: f64 = 100_000.0;
 const GRAVITY: f64 = 2_000.0;
 /// How many sizes of the whole model a body travels at most in a run that somebody wants.
 const FARTHEST: f64 = 50.0;
+/// Gap of contact over the thinnest way through a cell: less is that of shells of a thickness that nobody means.
+const THIN_GAP: f64 = 0.005;
 /// Cycles of a run of months.
 const MOST_CYCLES: u64 = 50_000_000;
 /// Cycles in which nothing happens yet.
@@ -51,14 +53,14 @@ pub(super) fn of(
     model: &Model,
     measured: &[Measured],
     units: Option<Units>,
-    cycles: Option<u64>,
+    (cycles, contact): (Option<u64>, Option<Closing>),
 ) -> Vec<String> {
     let bodies = bodies::of(model, measured);
     let mut doubts = Vec::new();
     if let Some(units) = units {
         values(model, measured, &units, &mut doubts);
     }
-    times(model, measured, &bodies, cycles, &mut doubts);
+    times(model, measured, &bodies, (cycles, contact), &mut doubts);
     meetings(model, measured, &bodies, &mut doubts);
     cells(model, measured, &mut doubts);
     symmetry(model, measured, &mut doubts);
@@ -162,7 +164,7 @@ fn times(
     model: &Model,
     measured: &[Measured],
     bodies: &[Body],
-    cycles: Option<u64>,
+    (cycles, contact): (Option<u64>, Option<Closing>),
     doubts: &mut Vec<String>,
 ) {
     let end = model.setup.control.end_time;
@@ -174,7 +176,10 @@ fn times(
                 .to_owned(),
         );
     }
-    let time = Units::named(&model.units).map_or("", |units| units.symbols[2]);
+    let [length, _, time, velocity, _] = Units::named(&model.units).map_or([""; 5], |units| units.symbols);
+    let step = measured.iter().map(|part| part.step).fold(f64::INFINITY, f64::min);
+    let least_cell = measured.iter().map(|part| part.least_cell).fold(f64::INFINITY, f64::min);
+    let is_many = cycles.is_some_and(|cycles| cycles > MOST_CYCLES);
     let size = norm(sub(
         std::array::from_fn(|a| bodies.iter().map(|body| body.high[a]).fold(f64::NEG_INFINITY, f64::max)),
         std::array::from_fn(|a| bodies.iter().map(|body| body.low[a]).fold(f64::INFINITY, f64::min)),
@@ -188,14 +193,25 @@ fn times(
             short((fastest * end / size).round()),
             short(3.0 * size / fastest)
         ));
-    } else if cycles.is_some_and(|cycles| cycles > MOST_CYCLES) {
+    } else if let Some(contact) = contact
+        && contact.step < step
+        && (is_many || contact.gap < THIN_GAP * least_cell)
+    {
+        let of_cells = if step.is_finite() { short(step) } else { "any".to_owned() };
+        doubts.push(format!(
+            "contact sets the time step, not the cells: bodies close in at {} {velocity} and may travel {TRAVEL} of the gap of {} {length} in a \
+             cycle, which takes {} {time} where the cells allow {of_cells}; a wider gap takes thicker shells, larger faces or bodies that start farther apart",
+            short(contact.speed),
+            short(contact.gap),
+            short(contact.step)
+        ));
+    } else if is_many {
         doubts.push(format!(
             "end_time {} {time}: {} cycles until then; check it and the smallest cells",
             short(end),
             short(cycles.unwrap_or_default() as f64)
         ));
     }
-    let step = measured.iter().map(|part| part.step).fold(f64::INFINITY, f64::min);
     if end < LEAST_CYCLES * step && step.is_finite() {
         doubts.push(format!(
             "end_time {} {time}: the run ends within {} cycles of {} {time}; times in {} are in {time}",
