@@ -116,7 +116,7 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 24] = [
+const NUMBERS: [(&str, &str); 25] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_002", "MAT_ORTHOTROPIC_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
@@ -125,6 +125,7 @@ const NUMBERS: [(&str, &str); 24] = [
     ("MAT_009", "MAT_NULL"),
     ("MAT_011", "MAT_STEINBERG"),
     ("MAT_015", "MAT_JOHNSON_COOK"),
+    ("MAT_018", "MAT_POWER_LAW_PLASTICITY"),
     ("MAT_020", "MAT_RIGID"),
     ("MAT_022", "MAT_COMPOSITE_DAMAGE"),
     ("MAT_024", "MAT_PIECEWISE_LINEAR_PLASTICITY"),
@@ -262,6 +263,14 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
                 limits.by_failure(f[2].origin(4, "D1"));
             }
             (None, law)
+        }
+        "MAT_POWER_LAW_PLASTICITY" => {
+            if f[1].real(1, 0.0) != 0.0 {
+                log.warn(cards[1].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
+            }
+            limits.read_failure_strain(&f[1], 2, "EPSF");
+            let elastic = moduli(2);
+            (elastic, metal::power_law(&f, elastic))
         }
         "MAT_MODIFIED_JOHNSON_COOK" => {
             needs_moduli = false;

@@ -34,6 +34,7 @@ pub(crate) mod ogden;
 pub(crate) mod orthotropic;
 pub(crate) mod plane_stress;
 pub(crate) mod porous;
+pub(crate) mod power_law;
 pub(crate) mod principal;
 pub(crate) mod remembering;
 pub(crate) mod riedel_hiermaier_thoma;
@@ -60,6 +61,7 @@ pub use modified_johnson_cook::ModifiedJohnsonCook;
 pub use mooney_rivlin::MooneyRivlin;
 pub use ogden::Ogden;
 pub use orthotropic::Orthotropic;
+pub use power_law::PowerLaw;
 pub use riedel_hiermaier_thoma::RiedelHiermaierThoma;
 pub use segmented_ceramic::SegmentedCeramic;
 pub use soil_foam::SoilFoam;
@@ -389,6 +391,8 @@ pub enum Strength {
     },
     /// Von Mises yield with saturating hardening.
     Voce(Voce),
+    /// Von Mises yield with hardening by a power of the whole strain.
+    PowerLaw(PowerLaw),
     /// Johnson and Cook's with saturating hardening and a rate factor that is a power.
     ModifiedJohnsonCook(ModifiedJohnsonCook),
     /// By the motion of dislocations.
@@ -483,7 +487,7 @@ macro_rules! declared_laws {
 }
 
 declared_laws!(
-    Voce, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, RiedelHiermaierThoma, Orthotropic, ChangChang, MooneyRivlin, Ogden, Viscoelastic;
+    Voce, PowerLaw, ModifiedJohnsonCook, ZerilliArmstrong, SteinbergGuinan, JohnsonHolmquist, SegmentedCeramic, HolmquistJohnsonCook, RiedelHiermaierThoma, Orthotropic, ChangChang, MooneyRivlin, Ogden, Viscoelastic;
     CrushableFoam, LowDensityFoam, SoilFoam, Honeycomb,
 );
 

@@ -2,11 +2,12 @@
 
 use mechanics::{
     material::{Eos, Failure, Strength},
-    strength::{ModifiedJohnsonCook, SteinbergGuinan, ZerilliArmstrong},
+    strength::{ModifiedJohnsonCook, PowerLaw, SteinbergGuinan, ZerilliArmstrong},
 };
 
 use super::{COLD, COLD_HEAT, Law, not_negative};
 use crate::{
+    fault::short,
     keyword::{erosion::Limits, fields::Fields},
     log::Log,
     table::Range,
@@ -17,6 +18,44 @@ fn refuse(f: &Fields<'_>, i: usize, expected: &str, advice: &str) {
     if f.real(i, 0.0) != 0.0 {
         f.fault(i, expected, advice);
     }
+}
+
+/// Up to here SIGY of a power law is a strain, above it a stress.
+const STRAIN_OF_SIGY: f64 = 0.02;
+
+/// `*MAT_POWER_LAW_PLASTICITY`: two cards.
+pub(super) fn power_law(f: &[Fields<'_>; 8], moduli: Option<(f64, f64)>) -> Option<Law> {
+    let [k, n] = [(4, "K"), (5, "N")].map(|(i, what)| f[0].positive(i, what));
+    let [reference, exponent] = [6, 7].map(|i| not_negative(&f[0], i));
+    let given = not_negative(&f[1], 0);
+    let ((young, poisson), k, n) = (moduli?, k?, n?);
+    let initial_strain = if given > STRAIN_OF_SIGY {
+        libm::pow(given / k, 1.0 / n)
+    } else if given > 0.0 {
+        given
+    } else if n < 1.0 {
+        libm::pow(young / k, 1.0 / (n - 1.0))
+    } else {
+        f[1].fault(0, "a yield stress or strain: with N of 1 or above no power begins with E", "give SIGY");
+        return None;
+    };
+    if !(f64::MIN_POSITIVE..10.0).contains(&initial_strain) {
+        let at = if given > 0.0 { (&f[1], 0) } else { (&f[0], 4) };
+        let expected =
+            format!("a strain at first yield above 0 and below 10, it comes to {}", short(initial_strain));
+        at.0.fault(at.1, expected, "correct K, N or SIGY");
+        return None;
+    }
+    let is_rated = reference > 0.0 && exponent > 0.0;
+    let strength = Strength::PowerLaw(PowerLaw {
+        shear: young / (2.0 * (1.0 + poisson)),
+        k,
+        n,
+        initial_strain,
+        reference_rate: if is_rated { reference } else { 0.0 },
+        rate_exponent: if is_rated { exponent } else { 1.0 },
+    });
+    Some(Law::Strength(strength))
 }
 
 /// `*MAT_MODIFIED_JOHNSON_COOK`: five cards and one of critical values, with the moduli of the first.

@@ -7,7 +7,8 @@ use mechanics::{
     mesh::{Guide, SolidAxes},
     strength::{
         CrushableFoam, HolmquistJohnsonCook, Honeycomb, LowDensityFoam, ModifiedJohnsonCook, MooneyRivlin,
-        Ogden, Orthotropic, RiedelHiermaierThoma, SoilFoam, SteinbergGuinan, Viscoelastic, ZerilliArmstrong,
+        Ogden, Orthotropic, PowerLaw, RiedelHiermaierThoma, SoilFoam, SteinbergGuinan, Viscoelastic,
+        ZerilliArmstrong,
     },
 };
 
@@ -68,6 +69,44 @@ fn rubber_has_its_constants_and_the_bulk_modulus_of_its_ratio() {
     }
     assert!(fault("*MAT_027\n1,1.1e-9,0.5,0.4,0.1\n").contains("Poisson's ratio above 0 and below 0.5"));
     assert!(fault("*MAT_027\n1,1.1e-9,0.49,0.4,0.1\n,,,7\n").contains("constants A and B"));
+}
+
+#[test]
+fn a_power_law_first_yields_where_sigy_says() {
+    let card =
+        |first: &str, second: &str| format!("*MAT_018\n1,7.85e-9,2.1e5,0.3,540.,0.22{first}\n{second}\n");
+    let law = |first: &str, second: &str| {
+        let steel = material(&card(first, second));
+        let Eos::Linear { bulk } = steel.eos else { panic!("{steel:?}") };
+        assert!((bulk / 175e3 - 1.0).abs() < 1e-12, "{bulk}");
+        let Strength::PowerLaw(law) = steel.strength else { panic!("{steel:?}") };
+        assert_eq!([law.shear, law.k, law.n], [2.1e5 / 2.6, 540.0, 0.22]);
+        law
+    };
+    // Where both lines meet the stress is the same.
+    let PowerLaw { initial_strain, reference_rate, .. } = law("", "");
+    assert!(
+        (2.1e5 * initial_strain / (540.0 * libm::pow(initial_strain, 0.22)) - 1.0).abs() < 1e-12,
+        "{initial_strain}"
+    );
+    assert_eq!(reference_rate, 0.0);
+    assert_eq!(law("", "0.01").initial_strain, 0.01);
+    let stress = law("", "190.").initial_strain;
+    assert!((540.0 * libm::pow(stress, 0.22) / 190.0 - 1.0).abs() < 1e-12, "{stress}");
+    let rated = law(",802.,3.585", "190.,,0.4");
+    assert_eq!([rated.reference_rate, rated.rate_exponent], [802.0, 3.585]);
+    let text = cube(&card("", "190.,1.,0.4"), "");
+    let eroding = deck::read_whole(&text, "a.k").expect("a good deck");
+    let strain = Criteria { plastic_strain: Some(0.4), ..Criteria::default() };
+    assert_eq!(eroding.model.setup.erosion.parts, [Some(strain)]);
+    assert!(
+        eroding.warnings.iter().any(|warning| warning.to_string().contains("VP: the rate")),
+        "{:?}",
+        eroding.warnings
+    );
+    assert!(fault(&card("", "").replace("0.22", "1.0")).contains("a yield stress or strain"));
+    assert!(fault(&card("", "1e9")).contains("above 0 and below 10"));
+    assert!(fault(&card("", "").replace("540.", "0.")).contains("K"));
 }
 
 #[test]

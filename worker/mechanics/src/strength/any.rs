@@ -2,7 +2,7 @@
 
 use super::{
     Deviator, Elastic, Heat, History, Hydro, JohnsonCook, RateFactor, Strain, Strength, StrengthLaw,
-    Tabulated, Voce, VonMises, apart::Apart, modified_johnson_cook::ModifiedCook,
+    Tabulated, Voce, VonMises, apart::Apart, modified_johnson_cook::ModifiedCook, power_law::Power,
     zerilli_armstrong::Dislocations,
 };
 use crate::{lanes::Lane, material::Material};
@@ -17,6 +17,7 @@ macro_rules! of_any {
             AnyStrength::Tabulated($law) => $call,
             AnyStrength::JohnsonCook($law) => $call,
             AnyStrength::Voce($law) => $call,
+            AnyStrength::PowerLaw($law) => $call,
             AnyStrength::ModifiedJohnsonCook($law) => $call,
             AnyStrength::ZerilliArmstrong($law) => $call,
         }
@@ -32,6 +33,7 @@ pub(crate) enum AnyStrength {
     Tabulated(Tabulated),
     JohnsonCook(JohnsonCook),
     Voce(Voce),
+    PowerLaw(Apart<Power>),
     ModifiedJohnsonCook(Apart<ModifiedCook>),
     ZerilliArmstrong(Apart<Dislocations>),
 }
@@ -71,6 +73,7 @@ impl AnyStrength {
                 })
             }
             Strength::Voce(law) => Self::Voce(law),
+            Strength::PowerLaw(law) => Self::PowerLaw(Apart(Power::new(&law))),
             Strength::ModifiedJohnsonCook(law) => {
                 Self::ModifiedJohnsonCook(Apart(ModifiedCook::new(&law, material.density)))
             }

@@ -66,6 +66,15 @@ pub fn all_laws() -> Vec<Material> {
         Strength::Voce(mechanics::strength::Voce { shear, yield_stress: 3e8, q: 2e8, b: 12.0 }),
         Failure::None,
     );
+    let power = mechanics::strength::PowerLaw {
+        shear,
+        k: 6e8,
+        n: 0.25,
+        initial_strain: 0.01,
+        reference_rate: 40.4,
+        rate_exponent: 5.0,
+    };
+    add(shock, Strength::PowerLaw(power), Failure::None);
     let modified = mechanics::strength::ModifiedJohnsonCook {
         shear,
         a: 3e8,
