@@ -21,6 +21,8 @@ pub(super) struct Limits {
     list: Vec<(Criterion, Placed<f64>)>,
     /// The card that says that they leave when the failure law of the material has broken them.
     failure: Option<Placed<bool>>,
+    /// NUMFIP of `*MAT_ADD_EROSION`: how many points of an element fail before it leaves.
+    pub(super) failed_points: Option<Placed<f64>>,
 }
 
 impl Limits {
@@ -108,6 +110,12 @@ impl Limits {
             self.add(criterion, limit);
         }
         self.failure = self.failure.take().or(other.failure);
+        self.failed_points = self.failed_points.take().or(other.failed_points);
+    }
+
+    /// Whether elements leave at a limit of this criterion.
+    pub(super) fn has(&self, criterion: Criterion) -> bool {
+        self.list.iter().any(|(known, _)| *known == criterion)
     }
 
     /// The `erosion` of a part, which stands where the first limit does; none without any.
@@ -204,15 +212,9 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
             );
         }
     }
-    // One point in each element: one layer, and one criterion is enough.
-    for (i, name) in [(6, "NUMFIP"), (7, "NCS")] {
-        if f[0].real(i, 1.0).abs() > 1.0 {
-            f[0].fault(
-                i,
-                format!("{name} 0 or 1: elements have one point and leave by one criterion"),
-                "leave it blank",
-            );
-        }
+    limits.failed_points = Some(f[0].placed(6, "NUMFIP", f[0].real(6, 1.0)));
+    if f[0].real(7, 1.0).abs() > 1.0 {
+        f[0].fault(7, "NCS 0 or 1: elements leave by one criterion", "leave it blank");
     }
     if given(4, 3).is_some() {
         limits.read_time_step(&f[4], 3, "DTMIN");

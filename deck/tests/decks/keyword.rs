@@ -278,6 +278,34 @@ fn each_field_of_mat_add_erosion_is_its_criterion() {
 }
 
 #[test]
+fn shells_break_point_by_point_and_say_so_where_mat_add_erosion_asks_for_fewer() {
+    let steel = "*MAT_PLASTIC_KINEMATIC\n1,7.85e-9,2.1e5,0.3,300.\n";
+    let of = |points: &str, limits: &str| {
+        let deck =
+            square(&format!("*SECTION_SHELL\n1,2,,3,,1\n1.0\n*MAT_ADD_EROSION\n1,{limits},,{points}\n"), "");
+        deck::read_whole(&deck.replace("*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n", steel), "a.k")
+    };
+    for (points, told) in [("-100", false), ("3", false), ("", true), ("1", true), ("-50", true)] {
+        let reading = of(points, ",,,-0.2").unwrap_or_else(|f| panic!("{}", lines(&f)));
+        let expected = Criteria { plastic_strain: Some(0.2), ..Criteria::default() };
+        assert_eq!(reading.model.setup.erosion.parts, [Some(expected)]);
+        let warnings: Vec<String> = reading.warnings.iter().map(ToString::to_string).collect();
+        let is_told =
+            warnings.iter().any(|w| w.contains("shells leave when all 3 points through their thickness"));
+        assert_eq!(is_told, told, "{points}: {warnings:?}");
+    }
+    for (limits, name) in [(",,,0.2", "EFFEPS"), (",0.2,,", "MXPRES"), (",,-0.2,", "MNEPS")] {
+        let faults = of("-100", limits).err().map(|f| lines(&f)).unwrap_or_default();
+        assert!(
+            faults.contains(name) && faults.contains("expected plastic_strain: shells"),
+            "{name}: {faults}"
+        );
+    }
+    let solids = fault("*MAT_ADD_EROSION\n1,,1.0,,,,4\n");
+    assert!(solids.contains("NUMFIP 0 or 1"), "{solids}");
+}
+
+#[test]
 fn materials_with_a_failure_strain_a_failure_law_or_a_least_step_erode_by_it() {
     let of = |card: &str| {
         let deck = cube("").replace("*MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n", card);

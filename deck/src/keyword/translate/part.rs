@@ -11,15 +11,16 @@ use super::{material::material_name, rigid, state::Translation};
 use crate::{
     geometry::{cross, sub},
     keyword::{
+        erosion::Limits,
         material::{Fibres, Law},
-        problem::{Section, ShellSection},
+        problem::{PartCard, Section, ShellSection},
     },
     place::{Origin, Place, Placed},
     table::MAX_NAME,
     typed::{
         condition::made,
         mesh::{PartMesh, Source},
-        part::{Choice, Erosion, Kind, Part},
+        part::{Choice, Criterion, Erosion, Kind, Part},
     },
 };
 
@@ -121,7 +122,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
                 _ => None,
             },
             hourglass: super::hourglass::of_part(t, id),
-            erosion: erosion_of(t, part.material.value),
+            erosion: erosion_of(t, part),
             mesh: (!t.without_section.contains(&id)).then_some(mesh),
             rotate: None,
             translate: None,
@@ -181,17 +182,45 @@ fn velocities(t: &Translation<'_>) -> (ByNode, ByNode) {
     (list, spins)
 }
 
-/// When elements of a material leave, by its own card and by `*MAT_ADD_EROSION`. Rigid ones do not erode.
-fn erosion_of(t: &Translation<'_>, material: u32) -> Option<Erosion> {
-    let card = t.problem.materials.get(&material)?;
+/// When elements of a part leave, by the card of its material and by `*MAT_ADD_EROSION`. Rigid ones do not erode.
+fn erosion_of(t: &Translation<'_>, part: &PartCard) -> Option<Erosion> {
+    let card = t.problem.materials.get(&part.material.value)?;
     if matches!(card.law, Law::Rigid { .. }) {
         return None;
     }
     let mut limits = card.erosion.clone();
-    if let Some(added) = t.problem.erosions.get(&material) {
+    if let Some(added) = t.problem.erosions.get(&part.material.value) {
+        check_failed_points(t, part, added);
         limits.merge(added.clone());
     }
     limits.erosion()
+}
+
+/// Looks at whether elements leave with as many failed points as `*MAT_ADD_EROSION` says: solids have one, shells leave with their last.
+fn check_failed_points(t: &Translation<'_>, part: &PartCard, limits: &Limits) {
+    let Some(Placed { value: points, origin }) = limits.failed_points else { return };
+    match t.problem.sections.get(&part.section.value) {
+        Some((_, Section::Shell(shell))) => {
+            let layers = shell.points;
+            let is_all = layers == 1 || points <= -100.0 || points >= f64::from(layers);
+            if limits.has(Criterion::PlasticStrain) && shell.plies.is_empty() && !is_all {
+                t.log.warn(
+                    origin.at,
+                    format!(
+                        "NUMFIP {points}: shells leave when all {layers} points through their thickness have come to EFFEPS, as with NUMFIP -100"
+                    ),
+                );
+            }
+        }
+        _ if points.abs() > 1.0 => {
+            t.log.fault_of(
+                origin,
+                "NUMFIP 0 or 1: elements that are no shells have one point",
+                "leave it blank",
+            );
+        }
+        _ => {}
+    }
 }
 
 /// The first card that asks for erosion; none where nothing erodes.
