@@ -20,14 +20,14 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
         let g = context.fields(second, block.width, &TENS);
         let form = f.integer(1);
         let section = match form {
-            form @ (0 | 1 | 4 | 5) => of_shape(&f, &g, (form == 5, context), card),
+            form @ (0 | 1 | 4 | 5 | 9) => of_shape(&f, &g, (form, context), card),
             2 => of_moments(&g).map(Section::Beam),
             3 => truss(&g),
             _ => {
                 f.fault(
                     1,
-                    "ELFORM 1, 2, 3, 4 or 5",
-                    "take the beam of Hughes and Liu or of Belytschko, or the truss",
+                    "ELFORM 1, 2, 3, 4, 5 or 9",
+                    "take the beam of Hughes and Liu or of Belytschko, the spot weld, or the truss",
                 );
                 None
             }
@@ -84,11 +84,11 @@ fn of_moments(g: &Fields<'_>) -> Option<BeamSection> {
     Some(BeamSection { area: area?, inertia, torsion, shear: [shear; 2], fibres: None, breaks: None })
 }
 
-/// TS1, TS2, TT1, TT2 of a rectangle (CST 0) or a tube (CST 1, or of ELFORM 5).
+/// TS1, TS2, TT1, TT2 of a rectangle (CST 0) or a round section (CST 1, or of ELFORM 5 and of 9, the spot weld).
 fn of_shape(
     f: &Fields<'_>,
     g: &Fields<'_>,
-    (is_tube, context): (bool, &Context<'_>),
+    (form, context): (i64, &Context<'_>),
     card: &Card<'_>,
 ) -> Option<Section> {
     let sizes = [0, 1, 2, 3].map(|i| g.real(i, 0.0));
@@ -97,12 +97,17 @@ fn of_shape(
             g.fault(other, "the same size at both ends", format!("give {name} as the one before it"));
         }
     }
-    for (i, what) in [(4, "NSLOC"), (5, "NTLOC")] {
+    let is_weld = form == 9;
+    if is_weld && g.real(6, 0.0) != 0.0 {
+        g.fault(6, "a spot weld that resists torsion", "leave ITOFF blank");
+    }
+    // In their place a spot weld says whether its forces are printed.
+    for (i, what) in [(4, "NSLOC"), (5, "NTLOC")].into_iter().filter(|_| !is_weld) {
         if g.real(i, 0.0) != 0.0 {
             g.fault(i, "nodes in the middle of the section", format!("leave {what} blank"));
         }
     }
-    let shape = match (f.integer(4), is_tube) {
+    let shape = match (f.integer(4), matches!(form, 5 | 9)) {
         (1, _) | (0, true) => {
             let [outer, inner] = [sizes[0], sizes[2]];
             if !(outer > inner && inner >= 0.0) {

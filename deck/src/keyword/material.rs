@@ -116,7 +116,7 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 25] = [
+const NUMBERS: [(&str, &str); 26] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_002", "MAT_ORTHOTROPIC_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
@@ -138,6 +138,7 @@ const NUMBERS: [(&str, &str); 25] = [
     ("MAT_077_O", "MAT_OGDEN_RUBBER"),
     ("MAT_077", "MAT_OGDEN_RUBBER"),
     ("MAT_098", "MAT_SIMPLIFIED_JOHNSON_COOK"),
+    ("MAT_100", "MAT_SPOTWELD"),
     ("MAT_107", "MAT_MODIFIED_JOHNSON_COOK"),
     ("MAT_110", "MAT_JOHNSON_HOLMQUIST_CERAMICS"),
     ("MAT_111", "MAT_JOHNSON_HOLMQUIST_CONCRETE"),
@@ -263,6 +264,10 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
                 limits.by_failure(f[2].origin(4, "D1"));
             }
             (None, law)
+        }
+        "MAT_SPOTWELD" => {
+            let elastic = moduli(2);
+            (elastic, metal::spot_weld(&f, elastic, &mut limits))
         }
         "MAT_POWER_LAW_PLASTICITY" => {
             if f[1].real(1, 0.0) != 0.0 {

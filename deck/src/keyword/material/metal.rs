@@ -20,6 +20,23 @@ fn refuse(f: &Fields<'_>, i: usize, expected: &str, advice: &str) {
     }
 }
 
+/// `*MAT_SPOTWELD` of beams and solids: yield stress, plastic hardening, and the plastic strain at which the weld is gone.
+pub(super) fn spot_weld(f: &[Fields<'_>; 8], moduli: Option<(f64, f64)>, limits: &mut Limits) -> Option<Law> {
+    refuse(&f[0], 6, "no mass scaling of the weld", "leave DT blank");
+    refuse(&f[0], 7, "no time at which the weld fails", "leave TFAIL blank");
+    for (i, name) in (1..).zip(["NRR", "NRS", "NRT", "MRR", "MSS", "MTT"]) {
+        let expected =
+            format!("{name} blank: welds fail by plastic strain, not by resultant forces and moments");
+        refuse(&f[1], i, &expected, "give EFAIL, or leave it blank");
+    }
+    limits.read_failure_strain(&f[1], 0, "EFAIL");
+    let yield_stress = f[0].positive(4, "a yield stress");
+    let hardening = not_negative(&f[0], 5);
+    let (young, poisson) = moduli?;
+    let shear = young / (2.0 * (1.0 + poisson));
+    Some(Law::Strength(Strength::VonMises { shear, yield_stress: yield_stress?, hardening, rate: None }))
+}
+
 /// Up to here SIGY of a power law is a strain, above it a stress.
 const STRAIN_OF_SIGY: f64 = 0.02;
 

@@ -139,6 +139,8 @@ fn eos_of(
         }
         _ => {}
     }
+    let is_of_solids =
+        matches!(t.problem.sections.get(&part.section.value), None | Some((_, Section::Solid { .. })));
     let is_of_shells = matches!(t.problem.sections.get(&part.section.value), Some((_, Section::Shell(_))));
     let elastic = match material.law {
         Law::JohnsonCook { of_shells, .. } if is_of_shells => material.elastic.or(of_shells),
@@ -213,6 +215,14 @@ fn eos_of(
         (None, Some((young, poisson))) => {
             let bulk = young / (3.0 * (1.0 - 2.0 * poisson));
             Some(Eos::Linear { bulk: t.number(material.at, "a bulk modulus of", bulk) })
+        }
+        (None, None) if !is_of_solids && matches!(material.law, Law::Null { .. }) => {
+            log.fault_of(
+                part.material.origin,
+                "a material that resists deformation: null shells and beams, which have mass alone, are not computed",
+                "take *MAT_ELASTIC with a small modulus, or *ELEMENT_MASS for their mass, and leave out what is only looked at",
+            );
+            None
         }
         (None, None) => {
             log.fault(
