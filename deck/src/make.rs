@@ -83,6 +83,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         Control { sort_lag: control::sort_lag(given, control.sort_lag, settings, log), ..control }
     });
     let erosion = erosion::make(deck, (&parts, &assembly), (&rigid, &bodies), log);
+    let particles = erosion::particles(deck, &names, &parts, &erosion, log);
     let output = output::make(deck, &names, &assembly, &bodies, log);
     let detonations = burn::make(deck, &materials, &parts, log);
     let axes = parts.iter().filter_map(|part| part.axes).collect();
@@ -119,7 +120,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         } else {
             Vec::new()
         };
-        Settings { erodes: erosion.is_on(), steps, ..settings }
+        Settings { erodes: erosion.is_on(), particles, steps, ..settings }
     });
     Some(Model {
         title: deck.title.clone(),

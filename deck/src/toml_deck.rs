@@ -201,7 +201,8 @@ fn read_erosion(deck: &Table<'_>) -> Option<FreedNodes> {
     let table = deck.get("erosion").and_then(|v| v.table("[erosion]".to_string()))?;
     let retain_inertia =
         table.get("retain_inertia").map(|value| value.placed(value.boolean().unwrap_or(true)));
+    let particles = table.get("particles").map(|value| value.placed(entry::parts(value)));
     let at = table.place();
     table.finish();
-    Some(FreedNodes { at, retain_inertia })
+    Some(FreedNodes { at, retain_inertia, particles })
 }

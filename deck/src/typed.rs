@@ -132,6 +132,8 @@ pub(crate) struct Symmetry {
 pub(crate) struct FreedNodes {
     pub(crate) at: Place,
     pub(crate) retain_inertia: Option<Placed<bool>>,
+    /// Parts of which they press on each other.
+    pub(crate) particles: Option<Placed<Parts>>,
 }
 
 /// Pairs of parts by name.

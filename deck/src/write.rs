@@ -38,6 +38,9 @@ pub(crate) fn text(deck: &Deck) -> String {
     if let Some(freed) = &deck.erosion {
         text.heading("[erosion]");
         text.some("retain_inertia", freed.retain_inertia.as_ref().map(|on| on.value));
+        if let Some(parts) = &freed.particles {
+            text.key("particles", names(&parts.value));
+        }
     }
     if let Some(contact) = &deck.contact {
         write_contact(&mut text, contact);

@@ -156,6 +156,7 @@ pub fn surface(model: &Model, stands: &dyn Fn(u32) -> bool) -> Surface {
     let mut surface = Surface::eroded(&model.mesh, &setup.materials, stands, &erodes, retain_inertia);
     if let Some(settings) = &setup.contact {
         let speed = initial::closing_speeds(&model.mesh, settings, &model.velocity);
+        surface.find_particles(&model.mesh, &setup.materials, settings, &speed);
         surface.stiffen(&model.mesh, &setup.materials, settings, &speed);
         if settings.edges {
             surface.find_edges(&model.mesh);

@@ -4,10 +4,14 @@ use mechanics::{erosion::Erosion, rigid::Body};
 
 use super::{
     assembly::Assembly,
+    names::Names,
     part::PartDraft,
     rigid::{self, RigidDraft},
 };
-use crate::{log::Log, typed::Deck};
+use crate::{
+    log::Log,
+    typed::{Deck, condition::Parts},
+};
 
 /// Gathers the criteria of all parts. Of rigid bodies no part erodes.
 pub(super) fn make(
@@ -71,4 +75,44 @@ pub(super) fn make(
         );
     }
     erosion
+}
+
+/// By part whether its freed nodes press on each other; empty where none do.
+pub(super) fn particles(
+    deck: &Deck,
+    names: &Names<'_>,
+    parts: &[PartDraft],
+    erosion: &Erosion,
+    log: &Log<'_>,
+) -> Vec<bool> {
+    let asked = deck.erosion.as_ref().and_then(|freed| freed.particles.as_ref());
+    let Some(asked) = asked else { return Vec::new() };
+    if !deck.has_contact {
+        log.fault_of(
+            asked.origin,
+            "a [contact], in which freed nodes press on each other",
+            "add [contact], or remove particles",
+        );
+    } else if !erosion.retain_inertia {
+        log.fault_of(
+            asked.origin,
+            "freed nodes that stay in the run",
+            "write retain_inertia = true, or remove particles",
+        );
+    }
+    let mut press = vec![false; parts.len()];
+    for p in names.several(&asked.value).unwrap_or_default() {
+        press[p] = parts[p].erosion.is_some();
+        if let Parts::Named(_) = asked.value
+            && parts[p].erosion.is_none()
+            && !erosion.parts.is_empty()
+        {
+            log.fault_of(
+                asked.origin,
+                format!("parts with erosion, and part \"{}\" has none", parts[p].name),
+                "give it erosion, or leave it out",
+            );
+        }
+    }
+    if press.contains(&true) { press } else { Vec::new() }
 }

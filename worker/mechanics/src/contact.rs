@@ -13,7 +13,7 @@
 //! 5. turns each hit into forces, a time-step vote and energies ([`force`]).
 //!
 //! That is a node against a face. Two edges that cross while no node is in a zone are not seen so; where the deck has them meet
-//! too, they are a kind of pairs of their own ([`edges`]), and so are nodes that are tied to faces (`ties`). What a kind does for the sort, the batch and the cycle is said in `pair`;
+//! too, they are a kind of pairs of their own ([`edges`]), and so are nodes that are tied to faces (`ties`) and particles that press on each other ([`particles`]). What a kind does for the sort, the batch and the cycle is said in `pair`;
 //! `kinds` lists them.
 //!
 //! Search, geometry (zone and joint) and force know nothing of each other; only `node_face` knows all three.
@@ -35,6 +35,7 @@ mod near_pairs;
 mod node_face;
 mod pair;
 mod pair_energy;
+pub mod particles;
 pub mod reach;
 pub mod search;
 mod share;
@@ -59,6 +60,7 @@ pub use kinds::sort;
 pub use map::Map;
 pub use pair::Kind;
 pub use pair_energy::{PairEnergies, PairEnergy};
+pub use particles::{BatchParticle, BatchParticles, Particle};
 pub use reach::Extent;
 pub use search::{Exclusions, cull};
 pub(crate) use share::{Cut, Share};
@@ -109,6 +111,8 @@ pub struct Settings {
     pub ties_break: bool,
     /// Whether any part erodes, so that faces come out with nodes in their zone.
     pub erodes: bool,
+    /// By part, whether its nodes that have lost all their elements press on each other ([`particles`]). Empty where none do.
+    pub particles: Vec<bool>,
 }
 
 impl Settings {
@@ -121,6 +125,11 @@ impl Settings {
     #[inline(always)]
     pub fn permits(&self, a: u32, b: u32) -> bool {
         self.interacts[a as usize * self.n_parts() + b as usize]
+    }
+
+    /// Whether how far nodes of two parts move against each other says when lists are stale: something of them may meet.
+    pub(crate) fn meets(&self, a: u32, b: u32) -> bool {
+        self.permits(a, b) || (a == b && self.particles.get(a as usize) == Some(&true))
     }
 
     /// Stiffness of a side of a part by its mass ([`force::least`]).

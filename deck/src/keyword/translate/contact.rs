@@ -102,7 +102,8 @@ fn write_freed_nodes(t: &mut Translation<'_>) {
     let (problem, log) = (t.problem, t.log);
     let Some(first) = first_erosion(t) else { return };
     let (at, keeps) = problem.control.freed_nodes.unwrap_or((first, false));
-    t.deck.erosion = Some(FreedNodes { at, retain_inertia: Some(Placed::new(keeps, Origin::card(at))) });
+    t.deck.erosion =
+        Some(FreedNodes { at, retain_inertia: Some(Placed::new(keeps, Origin::card(at))), particles: None });
     for contact in problem.contacts.iter().filter(|contact| !contact.erodes) {
         log.warn(
             contact.at,

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     edges::BatchEdges,
     pair::Kind,
+    particles::BatchParticles,
     search::Exclusions,
     surface::{Exposed, Surface},
     ties::BatchTies,
@@ -162,6 +163,8 @@ pub struct Listed {
     pub edges: BatchEdges,
     /// Nodes tied to faces.
     pub ties: BatchTies,
+    /// Pairs of particles.
+    pub particles: BatchParticles,
     /// What came out last; read in that cycle alone.
     pub exposed: Exposed,
 }
@@ -184,6 +187,7 @@ impl Listed {
         Self {
             edges: BatchEdges::gather(surface, units, node_index),
             ties: BatchTies::gather(surface, units, node_index),
+            particles: BatchParticles::gather(surface, units, node_index),
             exposed,
         }
     }
@@ -192,6 +196,9 @@ impl Listed {
     pub(super) fn is_sound(&self, n_nodes: usize, n_parts: usize) -> bool {
         let Exposed { nodes, faces, .. } = &self.exposed;
         let known = nodes.iter().all(|&node| (node as usize) < n_nodes) && faces.is_sorted();
-        known && self.edges.is_sound(n_nodes, n_parts) && self.ties.is_sound(n_nodes)
+        known
+            && self.edges.is_sound(n_nodes, n_parts)
+            && self.ties.is_sound(n_nodes)
+            && self.particles.is_sound(n_nodes)
     }
 }

@@ -17,9 +17,17 @@ const STICKS: usize = 3;
 /// [`bond`](super::bond)).
 const BOND: usize = 2;
 
+/// Numbers where nodes without elements are particles: what the ball lacks of its radius (see [`particles`](super::particles)).
+const PARTICLE: usize = 1;
+
 impl Settings {
     /// Numbers that contact keeps by node.
     pub fn n_history(&self) -> usize {
+        self.first_of_particle() + if self.any_particles() { PARTICLE } else { 0 }
+    }
+
+    /// Where the numbers of particles begin among those of a node.
+    pub(super) fn first_of_particle(&self) -> usize {
         self.first_of_bond() + if self.ties_break { BOND } else { 0 }
     }
 

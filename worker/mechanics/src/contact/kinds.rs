@@ -6,6 +6,7 @@ use super::{
     edges::{self, cycle::Edges},
     node_face::NodeFace,
     pair::{Books, Cycle, Pairs},
+    particles::{self, cycle::Particles},
     search::Exclusions,
     sort as by_cubes,
     surface::Surface,
@@ -31,6 +32,7 @@ pub fn sort(
     let mut units = by_cubes::units(surface, x, settings, exclusions);
     units.extend(edges::sort::units(surface, x, settings, exclusions));
     units.extend(ties::units(surface, settings));
+    units.extend(particles::sort::units(surface, x, settings));
     units
 }
 
@@ -40,6 +42,7 @@ pub(super) struct Kinds {
     pub(super) faces: NodeFace,
     edges: Edges,
     ties: Ties,
+    particles: Particles,
 }
 
 impl Kinds {
@@ -49,11 +52,12 @@ impl Kinds {
             faces: NodeFace::new(batch, settings, x, width),
             edges: Edges::new(batch, settings),
             ties: Ties::new(batch, settings),
+            particles: Particles::new(batch, settings),
         }
     }
 
-    pub(super) fn each(&self) -> [&dyn Pairs; 3] {
-        [&self.faces, &self.edges, &self.ties]
+    pub(super) fn each(&self) -> [&dyn Pairs; 4] {
+        [&self.faces, &self.edges, &self.ties, &self.particles]
     }
 
     /// The forces of all. Gives the greatest squared frequency.
@@ -62,6 +66,7 @@ impl Kinds {
         let faces = self.faces.forces(cycle, books);
         let edges = self.edges.forces(cycle, books);
         let ties = self.ties.forces(cycle, books);
-        faces.max(edges).max(ties)
+        let particles = self.particles.forces(cycle, books);
+        faces.max(edges).max(ties).max(particles)
     }
 }

@@ -1,7 +1,7 @@
 //! Map: what contact does to a surface in one state, for people to look at. No cycle uses it.
 //!
 //! The forces of a state follow from its positions alone, so they are computed again from these, with the very
-//! functions of a cycle. Friction is left out: what is mapped is the push between bodies.
+//! functions of a cycle. Friction and particles are left out: what is mapped is the push between bodies.
 
 use super::{
     Batch, Contact, Exclusions, Face, Settings, Surface, WARNING, WorkUnit,
@@ -38,6 +38,8 @@ impl Map {
     ) -> Self {
         let mut settings = settings.clone();
         settings.friction.fill(0.0);
+        // What they lack of their radii is not known here, and they are no bodies.
+        settings.particles.clear();
         let units: Vec<WorkUnit> = sort(surface, x, &settings, exclusions);
         let units: Vec<&WorkUnit> = units.iter().filter(|unit| !unit.is_empty()).collect();
         let batch = Batch::gather(surface, &units, mass, exclusions);

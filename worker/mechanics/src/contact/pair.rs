@@ -1,6 +1,6 @@
 //! The seam between contact and its kinds of pairs.
 //!
-//! A kind - a node against a face, an edge against an edge, a node tied to a face - is a module that does five things, each with its neighbours'
+//! A kind - a node against a face, an edge against an edge, a node tied to a face, a particle against a particle - is a module that does five things, each with its neighbours'
 //! shape:
 //! 1. it lists its pairs for a sort, as work units of its own [`Kind`], whose weight for the balance is the number of pairs that
 //!    a cycle looks at;
@@ -25,6 +25,8 @@ pub enum Kind {
     EdgeEdge,
     /// Nodes tied to faces: surface node and surface face, listed one by one.
     Tied,
+    /// Particles against particles: surface nodes, listed one by one, once for each of both.
+    Particles,
 }
 
 /// Arrays of one cycle, by batch node.

@@ -68,7 +68,7 @@ pub fn worst_spread(extents: &[Extent], settings: &Settings) -> (f64, [u32; 2]) 
     for (a, extent) in extents.iter().enumerate() {
         for (b, other) in extents.iter().enumerate().skip(a) {
             let spread = spread(extent, other);
-            if spread > worst.0 && settings.permits(a as u32, b as u32) {
+            if spread > worst.0 && settings.meets(a as u32, b as u32) {
                 worst = (spread, [a as u32, b as u32]);
             }
         }

@@ -8,6 +8,7 @@ use std::ops::Range;
 use super::{
     batch::{Batch, BatchUnit, Listed},
     edges::BatchEdges,
+    particles::BatchParticles,
     surface::Exposed,
     ties::BatchTies,
 };
@@ -35,6 +36,8 @@ pub(crate) struct Cut {
     edges: Vec<Range<usize>>,
     /// Ties of each.
     ties: Vec<Vec<u32>>,
+    /// Particles that each computes, ascending.
+    particles: Vec<Vec<u32>>,
     /// By node of the batch the share that computes it.
     owners: Vec<u32>,
 }
@@ -43,7 +46,8 @@ impl Cut {
     /// Cuts a batch into `most` shares of like work, fewer if it is small; one at least.
     pub(crate) fn new(batch: &Batch, most: usize) -> Self {
         let n_nodes: usize = batch.units.iter().map(|unit| unit.nodes.len()).sum();
-        let n_pairs = batch.listed.edges.pairs.len() + batch.listed.ties.nodes.len();
+        let Listed { edges, ties, particles, .. } = &batch.listed;
+        let n_pairs = edges.pairs.len() + ties.nodes.len() + particles.pairs.len();
         Self::into(batch, (n_nodes / NODES + n_pairs / PAIRS).clamp(1, most.max(1)))
     }
 
@@ -77,8 +81,18 @@ impl Cut {
             }
             ties[*owner as usize].push(tie as u32);
         }
+        let listed = &batch.listed.particles;
+        let mut particles = vec![Vec::new(); n];
+        for (i, of_one) in listed.pairs.chunk_by(|a, b| a[0] == b[0]).enumerate() {
+            let own = of_one[0][0];
+            let owner = &mut owners[listed.particles[own as usize].node as usize];
+            if *owner == NONE {
+                *owner = (n * i / listed.particles.len()) as u32;
+            }
+            particles[*owner as usize].push(own);
+        }
         owners.iter_mut().filter(|owner| **owner == NONE).for_each(|owner| *owner = 0);
-        Self { units, edges: even(batch.listed.edges.pairs.len()), ties, owners }
+        Self { units, edges: even(batch.listed.edges.pairs.len()), ties, particles, owners }
     }
 
     /// Number of shares.
@@ -86,7 +100,7 @@ impl Cut {
         self.units.len()
     }
 
-    /// By node of the batch the share that has it in a unit, which knows all faces that it may meet, or as a tied node; 0 for nodes
+    /// By node of the batch the share that has it in a unit, which knows all faces that it may meet, or as a tied node or a particle of its own; 0 for nodes
     /// of none, which that share need not have.
     pub(crate) fn owners(&self) -> &[u32] {
         &self.owners
@@ -95,16 +109,25 @@ impl Cut {
     /// One of the shares.
     pub(crate) fn share(&self, batch: &Batch, share: usize) -> Share {
         let units = &batch.units[self.units[share].clone()];
-        let Listed { edges, ties, exposed } = &batch.listed;
+        let Listed { edges, ties, particles: listed, exposed } = &batch.listed;
         let pairs = &edges.pairs[self.edges[share].clone()];
         let ties: Vec<[u32; 5]> = self.ties[share].iter().map(|&tie| ties.nodes[tie as usize]).collect();
+        let pairs_of = |own: u32| {
+            let first = listed.pairs.partition_point(|pair| pair[0] < own);
+            let n = listed.pairs[first..].partition_point(|pair| pair[0] == own);
+            &listed.pairs[first..first + n]
+        };
+        let presses: Vec<[u32; 2]> =
+            self.particles[share].iter().flat_map(|&own| pairs_of(own)).copied().collect();
 
         let mut faces = Indices::new(batch.faces.len());
         let mut edge_indices = Indices::new(edges.edges.len());
+        let mut particles = Indices::new(listed.particles.len());
         let mut nodes = Indices::new(batch.nodes.len());
         units.iter().flat_map(|unit| &unit.faces).for_each(|&face| faces.mark(face));
         pairs.iter().flatten().for_each(|&edge| edge_indices.mark(edge));
-        let (faces, edge_indices) = (faces.number(), edge_indices.number());
+        presses.iter().flatten().for_each(|&particle| particles.mark(particle));
+        let (faces, edge_indices, particles) = (faces.number(), edge_indices.number(), particles.number());
         units.iter().flat_map(|unit| &unit.nodes).for_each(|&node| nodes.mark(node));
         faces
             .list
@@ -114,6 +137,8 @@ impl Cut {
         let of_edges = edge_indices.list.iter().flat_map(|&edge| edges.edges[edge as usize].nodes);
         of_edges.for_each(|node| nodes.mark(node));
         ties.iter().flatten().for_each(|&node| nodes.mark(node));
+        let of_particles = particles.list.iter().map(|&particle| listed.particles[particle as usize].node);
+        of_particles.for_each(|node| nodes.mark(node));
         let nodes = nodes.number();
 
         let excluded = batch.excluded.iter().copied().filter(|&(node, face)| {
@@ -138,10 +163,16 @@ impl Cut {
                     pairs: pairs.iter().map(|pair| pair.map(|edge| edge_indices.of(edge))).collect(),
                 },
                 ties: BatchTies { nodes: ties.iter().map(|tie| tie.map(|node| nodes.of(node))).collect() },
+                particles: BatchParticles {
+                    particles: particles
+                        .taken(&listed.particles, |particle| particle.node = nodes.of(particle.node)),
+                    pairs: presses.iter().map(|pair| pair.map(|particle| particles.of(particle))).collect(),
+                },
                 exposed: Exposed {
                     at: exposed.at,
                     nodes: came_out.map(|&node| nodes.of(node)).collect(),
                     faces: exposed.faces.clone(),
+                    particles: Vec::new(),
                 },
             },
         };

@@ -11,7 +11,10 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::edges::{Edge, features::features};
+use super::{
+    edges::{Edge, features::features},
+    particles::Particle,
+};
 use crate::{
     material::Material,
     mesh::{MAX_NODES, Mesh, Part, Topology},
@@ -44,6 +47,8 @@ pub struct Surface {
     pub joined: Vec<(u32, u32)>,
     /// Edges that can meet others, by their nodes; empty unless they were asked for ([`Surface::find_edges`]).
     pub edges: Vec<Edge>,
+    /// Nodes without an element that press on each other, by node; empty unless they were asked for ([`Surface::find_particles`]).
+    pub particles: Vec<Particle>,
     /// What came out with the last change of the surface; nothing of one that has never changed.
     pub exposed: Exposed,
 }
@@ -56,6 +61,8 @@ pub struct Exposed {
     pub at: u64,
     pub nodes: Vec<u32>,
     pub faces: Vec<u32>,
+    /// Nodes that become particles. A batch has this with its particles instead.
+    pub particles: Vec<u32>,
 }
 
 /// One outer face.
@@ -230,6 +237,7 @@ impl Surface {
             faces,
             joined,
             edges: Vec::new(),
+            particles: Vec::new(),
             exposed: Exposed::default(),
         }
     }
@@ -240,7 +248,7 @@ impl Surface {
         let faces = (0..).zip(&self.faces).filter(|(_, face)| new(face)).map(|(f, _)| f).collect();
         let active = self.active.iter().zip(&before.active);
         let nodes = (0..).zip(active).filter(|(_, (now, then))| **now && !**then).map(|(n, _)| n).collect();
-        self.exposed = Exposed { at, nodes, faces };
+        self.exposed = Exposed { at, nodes, faces, particles: self.new_particles(before) };
     }
 
     /// Collects the edges that stick out, for contact of edges.

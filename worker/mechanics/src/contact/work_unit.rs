@@ -14,7 +14,7 @@ pub struct WorkUnit {
     pub nodes: Vec<u32>,
     /// Surface face indices, ascending; of nodes against faces only.
     pub faces: Vec<u32>,
-    /// Pairs that are listed one by one, of the other kinds: two surface edges.
+    /// Pairs that are listed one by one, of the other kinds: two surface edges, two particles.
     pub pairs: Vec<[u32; 2]>,
     /// Pairs to be tested: the unit's weight in the balance.
     pub interactions: u64,

@@ -5,6 +5,7 @@
 mod clouds;
 mod edges;
 mod force;
+mod particles;
 mod patch;
 mod sort;
 mod surface;

@@ -32,7 +32,7 @@ pub(super) struct CameOut {
 impl CameOut {
     /// Of a batch whose active faces have these ids, ascending.
     pub(super) fn of(batch: &Batch, ids: &[u32]) -> Self {
-        let Exposed { at, nodes, faces } = &batch.listed.exposed;
+        let Exposed { at, nodes, faces, .. } = &batch.listed.exposed;
         let mut of_nodes = vec![false; batch.nodes.len()];
         nodes.iter().for_each(|&node| of_nodes[node as usize] = true);
         Self {
