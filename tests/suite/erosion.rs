@@ -130,7 +130,7 @@ fn a_snapshot_while_an_element_has_eroded_and_its_faces_still_stand_changes_no_b
 }
 
 /// Snapshots in each cycle between an erosion and the new surface, in which freed nodes are dropped, and runs from them.
-fn snapshots_after_an_erosion(model: &Model) {
+pub(crate) fn snapshots_after_an_erosion(model: &Model) {
     let alone = solved(model, Workers::default());
     let one = Fingerprint::of(&alone);
     let cycles = cycles_of_erosion(&alone.state);

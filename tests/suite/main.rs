@@ -16,6 +16,7 @@ mod hourglass;
 mod joints;
 mod late;
 mod pairs;
+mod particles;
 mod sections;
 mod seeds;
 mod spans;

@@ -262,7 +262,7 @@ const WHOLE: u64 = 1_000_000;
 
 /// Every deck of `deck/examples`, the cycle at which its run ends, and what has happened by then. An explosive burns from the
 /// first cycle on.
-const EXAMPLES: [(&str, u64, Event); 25] = [
+const EXAMPLES: [(&str, u64, Event); 26] = [
     ("aramid-panel.toml", 1500, Event::Contact),
     ("ball-on-shell.k", WHOLE, Event::Contact),
     ("ball-tears-sheet.toml", 400, Event::Erosion),
@@ -282,6 +282,7 @@ const EXAMPLES: [(&str, u64, Event); 25] = [
     ("punch-through-plate.k", WHOLE, Event::Erosion),
     ("ring-breaks.toml", WHOLE, Event::None),
     ("rod-through-plate.toml", 1000, Event::Erosion),
+    ("rubble-in-box.toml", 1000, Event::Erosion),
     ("self-contact.toml", WHOLE, Event::Contact),
     ("sphere-6-km-s.toml", 400, Event::Erosion),
     ("table-on-tubes.toml", 2000, Event::Contact),
