@@ -77,8 +77,8 @@ impl Settings {
 }
 
 impl Surface {
-    /// Collects the particles: nodes without an element, of parts whose flags are `settings.particles`. `speed` is the closing speed of
-    /// each part (length per time).
+    /// Collects the particles: nodes without an element, of parts whose flags are `settings.particles`; a joined node is of its lowest
+    /// part, as in all of contact. `speed` is the closing speed of each part (length per time).
     ///
     /// The side of a spring is as stiff as the cube of the ball under its bulk modulus, and stops at the closing speed another like itself before
     /// their centres meet. A node takes the share of it that it takes of the springs of faces.
@@ -102,8 +102,7 @@ impl Surface {
             place[node as usize] = n;
         }
         let mut volume = vec![0.0; self.nodes.len()];
-        let mut asked = vec![false; self.nodes.len()];
-        for (part, asks) in mesh.parts.iter().zip(&settings.particles) {
+        for part in &mesh.parts {
             for e in 0..part.n_elements() {
                 let corners = part.nodes_of(e);
                 if corners.iter().all(|&node| place[node as usize] == NONE) {
@@ -113,13 +112,15 @@ impl Surface {
                 for (&node, share) in corners.iter().zip(part.shares()) {
                     if let Some(volume) = volume.get_mut(place[node as usize] as usize) {
                         *volume += share * of_element;
-                        asked[place[node as usize] as usize] |= asks;
                     }
                 }
             }
         }
-        for node in (0..self.nodes.len()).filter(|&node| asked[node] && volume[node] > 0.0) {
+        for node in (0..self.nodes.len()).filter(|&node| volume[node] > 0.0) {
             let part = self.node_part[node] as usize;
+            if settings.particles.get(part) != Some(&true) {
+                continue;
+            }
             let material = &materials[mesh.parts[part].material as usize];
             let side = libm::cbrt(volume[node]);
             let modulus = material.bulk().max(material.density * (speed[part] * speed[part]));

@@ -454,3 +454,31 @@ fn parts_that_do_not_meet_do_not_press_and_each_part_presses_itself() {
         assert_eq!(forces[0][1] < 0.0, expected, "of two");
     }
 }
+
+/// Two cubes that share four nodes, of which the parts that are flagged have particles.
+#[test]
+fn a_joined_node_is_a_particle_of_its_lowest_part() {
+    let mut mesh = block([1, 1, 1], 1.0);
+    add_block(&mut mesh, [1, 1, 1], [0.0, 0.0, 1.0], 1.0);
+    // The lower side of the second cube is the upper one of the first.
+    (0..4).for_each(|i| mesh.parts[1].nodes[i] = 4 + i as u32);
+    let found = |particles: [bool; 2]| -> Vec<(u32, f64)> {
+        let settings = Settings { particles: particles.to_vec(), ..settings(2, 0.1, 0.4) };
+        let mut surface = Surface::eroded(&mesh, &materials(), &|_| false, &[true; 2], true);
+        surface.find_particles(&mesh, &materials(), &settings, &[0.0; 2]);
+        let of =
+            |p: &mechanics::contact::Particle| (surface.nodes[p.node as usize], (2.0 * p.radius).powi(3));
+        surface.particles.iter().map(of).collect()
+    };
+    let [lower, upper] = [found([true, false]), found([false, true])];
+    let nodes = |found: &[(u32, f64)]| found.iter().map(|(node, _)| *node).collect::<Vec<_>>();
+    assert_eq!(nodes(&lower), [0, 1, 2, 3, 4, 5, 6, 7]);
+    assert_eq!(nodes(&upper), [12, 13, 14, 15]);
+    for (node, volume) in lower.into_iter().chain(upper) {
+        let expected = if (4..8).contains(&node) { 0.25 } else { 0.125 };
+        assert!(
+            (volume - expected).abs() < 1e-14,
+            "node {node} has {volume}, both elements give it {expected}"
+        );
+    }
+}
