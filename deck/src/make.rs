@@ -94,6 +94,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
 
     for (part, draft) in assembly.mesh.parts.iter_mut().zip(&parts) {
         if draft.eight_points {
+            part::warn_of_forms(part, draft, log);
             part.refine_points();
         }
         if let Topology::Tetrahedra { .. } = part.topology {

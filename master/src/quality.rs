@@ -302,7 +302,7 @@ fn gauges(model: &Model, dead: &[DeadGauge]) -> Option<Measure> {
     })
 }
 
-/// Four-node tetrahedra of a part, which are hexahedra that collapse to four corners.
+/// Four-node tetrahedra of a part.
 fn locks(part: &Part) -> Option<Measure> {
     if part.n_corners() != 8 {
         return None;

@@ -10,6 +10,7 @@ mod documents;
 mod eight_points;
 mod erosion;
 mod flips;
+mod forms;
 mod fuzz;
 mod holders;
 mod hourglass;

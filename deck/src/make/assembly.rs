@@ -406,7 +406,7 @@ fn velocities(assembly: &mut Assembly, materials: &[Material]) {
         for e in 0..part.n_elements() {
             let whole = density * assembly.volumes[element];
             element += 1;
-            for (&node, share) in part.nodes_of(e).iter().zip(part.shares()) {
+            for (&node, share) in part.nodes_of(e).iter().zip(part.shares(e)) {
                 let mass = whole * share;
                 if count[node as usize] > 1 {
                     let list = holders.entry(node).or_default();

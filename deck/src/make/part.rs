@@ -7,7 +7,7 @@ use mechanics::{
     erosion::{Criteria, GEOMETRIC_STRAIN},
     failure::scatter::Scatter,
     material::{Failure, Material, Strength},
-    mesh::{Laminate, SolidAxes, Topology},
+    mesh::{self, Form, Laminate, SolidAxes, Topology},
 };
 
 use super::material::Materials;
@@ -424,8 +424,6 @@ fn body_of(
         );
         return None;
     };
-    let distinct =
-        |corners: &[u32]| (0..corners.len()).filter(|&i| !corners[..i].contains(&corners[i])).count();
     let of_two_orders = called.is_some()
         && found.tetrahedra.is_empty()
         && mesh.file.bodies_called(name).any(|(_, other)| !other.tetrahedra.is_empty());
@@ -483,29 +481,45 @@ fn body_of(
     Some((Block { positions, topology, faces: Vec::new() }, numbers))
 }
 
-/// Tells of elements that are computed as hexahedra or quadrilaterals whose corners coincide. Keyword decks told that already.
+/// How many different nodes an element names.
+fn distinct(corners: &[u32]) -> usize {
+    (0..corners.len()).filter(|&i| !corners[..i].contains(&corners[i])).count()
+}
+
+/// Tells of elements that have one strain alone, and of triangles, which are computed as quadrilaterals whose corners coincide. Keyword
+/// decks told that already.
 fn warn_of_collapsed(part: &Part, at: &PartMesh, body: &Body, log: &Log<'_>) {
     if log.is_of_keywords() {
         return;
     }
-    let collapsed = |corners: &[u32]| (1..corners.len()).any(|i| corners[..i].contains(&corners[i]));
-    let count = body.elements().filter(|(_, corners)| collapsed(corners)).count();
+    let of = |n: usize| body.elements().filter(|(_, corners)| distinct(corners) == n).count();
+    let (count, what) = match part.kind {
+        Kind::Solids if body.tetrahedra.is_empty() => (
+            of(4),
+            "tetrahedra of four nodes: of one strain each, too stiff where they bend, flow or keep their volume; \
+             tetrahedra = \"composite\" in the mesh of the part puts nodes on their edges",
+        ),
+        Kind::Shells(_) => (of(3), "triangles: computed as quadrilaterals with two corners in one node"),
+        _ => return,
+    };
     if count > 0 {
         let all = body.elements().count();
-        let are_tetrahedra =
-            count == all && body.solids.iter().all(|(_, n)| n[4..] == [n[4]; 4] && n[2] == n[3]);
-        let (what, computed) = match part.kind {
-            Kind::Solids if are_tetrahedra => (
-                "tetrahedra",
-                "hexahedra whose corners coincide, too stiff where they flow or keep their volume; \
-                 tetrahedra = \"composite\" in the mesh of the part puts nodes on their edges",
-            ),
-            Kind::Solids => ("wedges, pyramids or tetrahedra", "hexahedra whose corners coincide"),
-            _ => ("triangles", "quadrilaterals with two corners in one node"),
-        };
+        log.warn(at.at, format!("part \"{}\": {count} of {all} elements are {what}", part.name));
+    }
+}
+
+/// Tells of solids of eight points that have fewer nodes.
+pub(super) fn warn_of_forms(part: &mesh::Part, draft: &PartDraft, log: &Log<'_>) {
+    let all = part.n_elements();
+    let count = (0..all).filter(|&e| part.form(e) != Form::Hexahedron).count();
+    if count > 0 {
         log.warn(
-            at.at,
-            format!("part \"{}\": {count} of {all} elements are {what}: computed as {computed}", part.name),
+            draft.at,
+            format!(
+                "part \"{}\": {count} of {all} elements are wedges, pyramids or tetrahedra: with eight points computed as \
+                 hexahedra whose corners coincide; with one they are elements of their own",
+                part.name
+            ),
         );
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use mechanics::{
     element::shell4::Rule,
     failure::scatter::Scatter,
-    mesh::{Axis, Guide, Laminate, MAX_LAYERS, Plies, Ply, Section, SolidAxes},
+    mesh::{Axis, Form, Guide, Laminate, MAX_LAYERS, Plies, Ply, Section, SolidAxes},
 };
 
 use super::{
@@ -359,7 +359,7 @@ fn read_mesh(
         let composite = match inner.get("tetrahedra") {
             None => Some(None),
             Some(value) => {
-                let word = value.one_of(&["collapsed", "composite"]);
+                let word = value.one_of(&["linear", "composite"]);
                 word.map(|word| (word == 1).then(|| value.origin()))
             }
         };
@@ -441,10 +441,15 @@ fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
         }
         let mut sorted = corners.clone();
         sorted.sort_unstable();
-        if complete && sorted.windows(2).any(|w| w[0] == w[1]) {
+        let whole = <[u32; 8]>::try_from(&corners[..]).ok().filter(|_| matches!(kind, Kind::Solids));
+        let is_solid = whole.is_some_and(|corners| Form::of(&corners) != Form::Hexahedron);
+        if complete && !is_solid && sorted.windows(2).any(|w| w[0] == w[1]) {
             complete = false;
             let (expected, advice) = match kind {
-                Kind::Solids => ("eight different nodes", "list each corner once; wedges are not read"),
+                Kind::Solids => (
+                    "eight different nodes, or six, five or four of a wedge, a pyramid or a tetrahedron",
+                    "repeat the nodes of such an element as 1 2 3 4 5 5 6 6, 1 2 3 4 5 5 5 5 or 1 2 3 3 4 4 4 4",
+                ),
                 Kind::Shells(_) => {
                     ("four different nodes", "list each corner once; triangles come in mesh files")
                 }

@@ -398,7 +398,7 @@ fn a_mesh_file_that_is_missing_is_a_fault_of_the_deck() {
 }
 
 #[test]
-fn wedges_pyramids_and_tetrahedra_are_hexahedra_whose_corners_coincide() {
+fn wedges_pyramids_and_tetrahedra_repeat_corners_of_a_hexahedron() {
     let more = "*ELEMENT_SOLID\n2,1,1,2,3,4,5,5,8,8\n3,1,1,2,3,4,5,5,5,5\n4,1,1,2,3,5,5,5,5,5\n5,1,1,2,3,5\n";
     let model = good(more);
     let corners = |e: usize| model.mesh.parts[0].corners(e).map(|n| model.mesh.node_ids[n as usize]);

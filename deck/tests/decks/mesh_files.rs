@@ -299,7 +299,8 @@ fn warnings(name: &str, text: &str, names: [&str; 3]) -> Vec<String> {
 #[test]
 fn what_is_left_out_and_what_is_computed_otherwise_is_a_warning() {
     let collapsed = [
-        "deck.toml:9: part \"solid\": 3 of 4 elements are wedges, pyramids or tetrahedra: computed as hexahedra whose corners coincide",
+        "deck.toml:9: part \"solid\": 1 of 4 elements are tetrahedra of four nodes: of one strain each, too stiff where they bend, flow or \
+         keep their volume; tetrahedra = \"composite\" in the mesh of the part puts nodes on their edges",
         "deck.toml:14: part \"skin\": 1 of 2 elements are triangles: computed as quadrilaterals with two corners in one node",
     ];
     let with =

@@ -6,6 +6,7 @@ use deck::model::Model;
 use mechanics::{
     cycle::Subdomain,
     exact::Quanta,
+    mesh::Mesh,
     piece::{self, Piece, Region},
     state::GlobalState,
     vote::Watched,
@@ -141,7 +142,7 @@ impl Job {
         let dropped =
             epoch.sorts.eroded().map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
         if self.options.replay {
-            epoch.samples = Samples::new(blocks_of(&layout, &threads));
+            epoch.samples = Samples::new(blocks_of(&model.mesh, &layout, &threads));
         }
         let mut basis = None;
         let (exchange, interactions) = match (&problem.touching, &model.setup.contact) {
@@ -247,7 +248,8 @@ impl Division {
         let n = threads.len();
         let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
         let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
-        for ((id, subdomain), regions) in layout.iter().enumerate().zip(blocks(layout, threads)) {
+        for ((id, subdomain), regions) in layout.iter().enumerate().zip(blocks(&model.mesh, layout, threads))
+        {
             let cut = |region: &Region| piece::cut(&model.mesh, state, subdomain.part, region);
             let pieces: Vec<Piece> = regions.par_iter().map(cut).collect();
             let n_nodes = pieces.iter().map(|p| p.nodes.len()).sum();
@@ -292,22 +294,24 @@ const BLOCKS: usize = 4;
 /// Elements of a block below which its nodes, which other blocks have too, cost more than an even share gains.
 const ELEMENTS: usize = 2000;
 
-/// The blocks of each sub-domain: of a worker with several threads at least one for each, in proportion to the elements.
-fn blocks(layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<Region>> {
+/// The blocks of each sub-domain: of a worker with several threads at least one for each, in proportion to the elements, and of each
+/// form of elements one of its own.
+fn blocks(mesh: &Mesh, layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<Region>> {
     let mut elements = vec![0; threads.len()];
     layout.iter().for_each(|subdomain| elements[subdomain.worker] += subdomain.region.n_elements());
     let of_subdomain = |subdomain: &decompose::Subdomain| {
         let (all, threads) = (elements[subdomain.worker].max(1), threads[subdomain.worker].max(1) as usize);
         let n = if threads > 1 { (all / ELEMENTS).clamp(threads, BLOCKS * threads) } else { 1 };
-        subdomain.region.split((n * subdomain.region.n_elements()).div_ceil(all).max(1))
+        let regions = subdomain.region.split((n * subdomain.region.n_elements()).div_ceil(all).max(1));
+        regions.into_iter().flat_map(|region| region.by_form(&mesh.parts[subdomain.part])).collect()
     };
     layout.iter().map(of_subdomain).collect()
 }
 
 /// By worker: part and elements of each of its blocks, in the worker's order.
-fn blocks_of(layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<(usize, Region)>> {
+fn blocks_of(mesh: &Mesh, layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<(usize, Region)>> {
     let mut by_worker = vec![Vec::new(); threads.len()];
-    for (subdomain, regions) in layout.iter().zip(blocks(layout, threads)) {
+    for (subdomain, regions) in layout.iter().zip(blocks(mesh, layout, threads)) {
         by_worker[subdomain.worker].extend(regions.into_iter().map(|region| (subdomain.part, region)));
     }
     by_worker

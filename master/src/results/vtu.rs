@@ -15,7 +15,7 @@ pub mod read;
 use deck::model::Model;
 use mechanics::{
     element::{beam2, shell4, tet10},
-    mesh::{Column, Nodes, Part, Topology},
+    mesh::{Column, Form, Part, Topology},
     state::{GlobalState, PartHistory, field},
 };
 
@@ -32,7 +32,10 @@ pub use fields::Fields;
 /// Cell type of the eight-node hexahedron.
 const VTK_HEXAHEDRON: u8 = 12;
 
-/// Cell types of trusses and beams, of shells, and of tetrahedra of ten nodes.
+/// Cell types of the solids with fewer nodes, of trusses and beams, of shells, and of tetrahedra of ten nodes.
+const VTK_TETRA: u8 = 10;
+const VTK_WEDGE: u8 = 13;
+const VTK_PYRAMID: u8 = 14;
 const VTK_LINE: u8 = 3;
 const VTK_QUAD: u8 = 9;
 const VTK_QUADRATIC_TETRA: u8 = 24;
@@ -59,10 +62,35 @@ impl Elements<'_> {
         self.model.mesh.parts[part].corners(local).map(i64::from)
     }
 
-    /// All nodes of an element, a shell's twice.
-    fn nodes(&self, element: usize) -> Nodes {
+    /// Whether all cells are hexahedra.
+    fn are_hexahedra(&self) -> bool {
+        let is_hexahedron = |part: &Part, e: usize| part.form(e) == Form::Hexahedron;
+        let mut parts = self.model.mesh.parts.iter();
+        parts.all(|part| part.n_corners() == 8 && (0..part.n_elements()).all(|e| is_hexahedron(part, e)))
+    }
+
+    /// Type and nodes of the cell of an element.
+    fn cell(&self, element: usize) -> (u8, Vec<u32>) {
         let (part, local) = self.locate(element);
-        self.model.mesh.parts[part].nodes_of(local)
+        let part = &self.model.mesh.parts[part];
+        let nodes = part.nodes_of(local)[..part.n_corners()].to_vec();
+        match part.n_corners() {
+            2 => (VTK_LINE, nodes),
+            4 => (VTK_QUAD, nodes),
+            tet10::NODES => (VTK_QUADRATIC_TETRA, nodes),
+            _ => match part.form(local) {
+                Form::Hexahedron => (VTK_HEXAHEDRON, nodes),
+                form => {
+                    let (_, corners) = Form::turned(part.corners(local));
+                    let kind = match form {
+                        Form::Wedge => VTK_WEDGE,
+                        Form::Pyramid => VTK_PYRAMID,
+                        _ => VTK_TETRA,
+                    };
+                    (kind, form.nodes().iter().map(|&corner| corners[corner]).collect())
+                }
+            },
+        }
     }
 
     fn n_corners(&self, element: usize) -> usize {
@@ -84,7 +112,8 @@ impl Elements<'_> {
     }
 }
 
-/// Writes one state as a `.vtu` file, whole or not at all. Shells are quadrilaterals and trusses lines in it. With shells there are two
+/// Writes one state as a `.vtu` file, whole or not at all. Shells are quadrilaterals and trusses lines in it, solids of fewer nodes cells of
+/// their form. With shells there are two
 /// more element fields: `thickness` (zero for solids) and `von_mises_max`, the greatest of their layers; other stresses of
 /// shells are means through the thickness in the frame of the element.
 ///
@@ -150,13 +179,15 @@ pub fn stream(
     let cell: Vec<Array> =
         if n_cells < n_elements { cell.into_iter().map(|array| array.only(&kept)).collect() } else { cell };
     let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
-    // Where not every element has eight corners the lists are made first.
-    let mixed = model.mesh.parts.iter().any(|part| part.n_corners() != 8);
-    let (mut corners, mut ends) = (Vec::new(), Vec::new());
+    // Where not every element has eight nodes the lists are made first.
+    let mixed = !elements.are_hexahedra();
+    let (mut corners, mut ends, mut types) = (Vec::new(), Vec::new(), Vec::new());
     if mixed {
         for &e in &kept {
-            corners.extend(elements.nodes(e)[..elements.n_corners(e)].iter().map(|&node| i64::from(node)));
+            let (kind, nodes) = elements.cell(e);
+            corners.extend(nodes.into_iter().map(i64::from));
             ends.push(corners.len() as i64);
+            types.push(kind);
         }
     }
     let connectivity = if mixed {
@@ -174,14 +205,7 @@ pub fn stream(
             components: 1,
             tuples: n_cells,
             grouped: true,
-            put: Box::new(|cell, out| {
-                out.push(match if mixed { elements.n_corners(kept[cell]) } else { 8 } {
-                    2 => VTK_LINE,
-                    4 => VTK_QUAD,
-                    tet10::NODES => VTK_QUADRATIC_TETRA,
-                    _ => VTK_HEXAHEDRON,
-                });
-            }),
+            put: Box::new(|cell, out| out.push(types.get(cell).copied().unwrap_or(VTK_HEXAHEDRON))),
         },
     ];
     let sections: [(&str, &[Array]); 4] =

@@ -17,7 +17,7 @@ use master::results::{
     history::{GaugeRow, History, HistoryRow, PartEnergy, Table},
     summary::{Energies, NamedPair, NamedPart, Summary, WorkUnits, WorkerTimes},
     von_mises::von_mises,
-    vtu::{Fields, Series, write_vtu},
+    vtu::{Fields, Series, read::Piece, write_vtu},
 };
 use mechanics::{
     constraint::Constraint,
@@ -368,6 +368,37 @@ fn every_array_of_a_state_reads_back_to_the_same_bits() {
     });
     assert_eq!(array(&file, "stress"), bytes_of(stress));
     assert!(file.ends_with(b"\n  </AppendedData>\n</VTKFile>\n"));
+}
+
+#[test]
+fn wedges_pyramids_and_tetrahedra_are_cells_of_their_own_and_read_back_as_hexahedra() {
+    let mut model = plates(2);
+    let chip = model.mesh.parts.last_mut().expect("there is one");
+    let hexahedra = vec![[0, 1, 3, 3, 4, 5, 7, 7], [0, 1, 3, 2, 4, 4, 4, 4], [0, 1, 3, 3, 4, 4, 4, 4]];
+    chip.element_ids = vec![9001, 9002, 9003];
+    chip.topology = Topology::Explicit { hexahedra };
+    let first = chip.nodes[0];
+    let path = Folder::create(&scratch("forms"), false).expect("fresh folder").file("state.vtu");
+    write_vtu(&path, &model, &dented(&model, 7, 2.0), &Fields::of(&model.output).expect("known names"), None)
+        .expect("written");
+    let file = fs::read(&path).expect("written");
+    let types = array(&file, "types");
+    let n = types.len();
+    assert_eq!((n, &types[n - 4..]), (model.mesh.n_elements(), &[12, 13, 14, 10][..]));
+    let nodes: Vec<i64> = array(&file, "connectivity")
+        .chunks_exact(8)
+        .map(|bytes| i64::from_le_bytes(bytes.try_into().expect("eight")) - i64::from(first))
+        .collect();
+    // Which node of a form comes first is free; the triangle 0 1 3 of the wedge looks out of it, down, and its nodes stand below the others.
+    assert_eq!(nodes[nodes.len() - 15..], [1, 0, 3, 5, 4, 7, 0, 1, 3, 2, 4, 0, 1, 3, 4]);
+    let cells = Piece::open(&path).and_then(|piece| piece.cells("Cells")).expect("whole");
+    let solid = |cell: &Vec<u32>| {
+        let x = std::array::from_fn(|corner| model.mesh.positions[cell[corner] as usize]);
+        mechanics::element::hex8::volume(&x)
+    };
+    let volumes: Vec<f64> = cells[n - 3..].iter().map(solid).collect();
+    let exact = [1.0 / 2.0, 1.0 / 3.0, 1.0 / 6.0];
+    assert!(volumes.iter().zip(exact).all(|(found, exact)| (found - exact).abs() < 1e-14), "{volumes:?}");
 }
 
 #[test]

@@ -112,7 +112,7 @@ pub fn state(
     let mut index = 0;
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
-            for (&n, share) in part.nodes_of(e).iter().zip(part.shares()) {
+            for (&n, share) in part.nodes_of(e).iter().zip(part.shares(e)) {
                 state.mass[n as usize] += quantum.round(mass_of[index] * share);
             }
             index += 1;

@@ -4,10 +4,12 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub(crate) mod axes;
+mod form;
 pub(crate) mod laminate;
 mod sides;
 
 pub use axes::{Guide, SolidAxes};
+pub use form::Form;
 pub use laminate::{Axis, Column, Laminate, LaminateError, MAX_LAYERS, Plies, Ply, first_without_direction};
 pub(crate) use sides::spread;
 pub use sides::{CORNERS, FACES, MAX_NODES, Nodes, Spacing, UPPER, quad_area, twice};
@@ -62,7 +64,7 @@ pub enum Topology {
         /// Elements along I, J, K.
         cells: [u32; 3],
     },
-    /// Explicit hexahedra: eight indices into [`Part::nodes`] each.
+    /// Explicit hexahedra, and wedges, pyramids and tetrahedra among them ([`Form`]): eight indices into [`Part::nodes`] each.
     Explicit {
         /// Corner nodes, in the order of the crate's documentation.
         hexahedra: Vec<[u32; 8]>,
@@ -187,11 +189,20 @@ impl Part {
         }
     }
 
-    /// The share of the mass of an element that each of its [`Part::nodes_of`] carries.
-    pub fn shares(&self) -> &'static [f64] {
+    /// The share of the mass of element `e` that each of its [`Part::nodes_of`] carries, and zeros behind the last.
+    pub fn shares(&self, e: usize) -> [f64; MAX_NODES] {
         match &self.topology {
-            Topology::Tetrahedra { .. } => &tet10::SHARES,
-            _ => &[0.125; 8],
+            Topology::Tetrahedra { .. } => tet10::SHARES,
+            Topology::Explicit { hexahedra } => Form::shares(&hexahedra[e]),
+            _ => std::array::from_fn(|node| if node < 8 { 0.125 } else { 0.0 }),
+        }
+    }
+
+    /// The form of element `e`: of kinds that are no solids of one point, that of a hexahedron.
+    pub fn form(&self, e: usize) -> Form {
+        match &self.topology {
+            Topology::Explicit { hexahedra } => Form::of(&hexahedra[e]),
+            _ => Form::Hexahedron,
         }
     }
 

@@ -9,7 +9,7 @@ use crate::{
     element::{hourglass::Hourglass, layout::n_runs},
     erosion::criteria::PieceErosion,
     lanes::SET,
-    mesh::{Mesh, Topology},
+    mesh::{Form, Mesh, Part, Topology},
     state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},
 };
 
@@ -113,6 +113,20 @@ impl Region {
     }
 }
 
+impl Region {
+    /// Cuts into regions whose elements are of one [`Form`] each, as those of a piece are.
+    #[must_use]
+    pub fn by_form(self, part: &Part) -> Vec<Self> {
+        let Self::List(elements) = &self else { return vec![self] };
+        let of = |form: Form| elements.iter().copied().filter(move |&e| part.form(e as usize) == form);
+        let regions = Form::ALL.map(|form| Self::List(of(form).collect()));
+        match regions.iter().filter(|region| region.n_elements() > 0).count() {
+            0 | 1 => vec![self],
+            _ => regions.into_iter().filter(|region| region.n_elements() > 0).collect(),
+        }
+    }
+}
+
 /// What a lane of an element costs against a node.
 const ELEMENT: u64 = 8;
 
@@ -142,7 +156,7 @@ fn cuts(cells: [u32; 3], n: usize) -> [u32; 3] {
     (1..=most).rev().find_map(fits).unwrap_or([1; 3])
 }
 
-/// Cuts the piece of `region` of part `part` out of the global state.
+/// Cuts the piece of `region` of part `part`, of one [form](Region::by_form), out of the global state.
 ///
 /// # Panics
 /// If the region does not fit the part's topology: a fault of the caller, not of any input.

@@ -31,8 +31,8 @@ pub(super) fn read(t: &mut Translation<'_>) {
     let mut bodies: BTreeMap<u32, Found> = BTreeMap::new();
     let mut seen: HashMap<u32, Place> = HashMap::with_capacity(problem.solids.len());
     let mut missing: BTreeSet<u32> = BTreeSet::new();
-    // The first element whose corners coincide, and how many there are.
-    let mut collapsed: Option<(Place, usize)> = None;
+    // The first tetrahedron of four nodes, and how many there are.
+    let mut linear: Option<(Place, usize)> = None;
     for solid in &problem.solids {
         let (id, at) = (solid.id, solid.at);
         if let Some(first) = seen.insert(id, at) {
@@ -65,8 +65,8 @@ pub(super) fn read(t: &mut Translation<'_>) {
             );
             continue;
         }
-        if distinct < 8 && solid.edges.is_none() {
-            collapsed.get_or_insert((at, 0)).1 += 1;
+        if distinct == 4 && solid.edges.is_none() {
+            linear.get_or_insert((at, 0)).1 += 1;
         }
         let v = volume(&corners);
         if !(v > 0.0 && v.is_finite()) {
@@ -89,10 +89,12 @@ pub(super) fn read(t: &mut Translation<'_>) {
         }
         found.places.push(at);
     }
-    if let Some((at, count)) = collapsed {
+    if let Some((at, count)) = linear {
         log.warn(
             at,
-            format!("{count} wedges, pyramids or tetrahedra: computed as hexahedra whose corners coincide"),
+            format!(
+                "{count} tetrahedra of four nodes: of one strain each, too stiff where they bend, flow or keep their volume"
+            ),
         );
     }
     let mut named = read_shells(t, &mut bodies);

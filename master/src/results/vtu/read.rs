@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{super::PVD, appended, field_data};
+use super::{super::PVD, VTK_PYRAMID, VTK_TETRA, VTK_WEDGE, appended, field_data};
 use crate::results::Error;
 
 /// What stands between head and numbers.
@@ -211,7 +211,8 @@ impl Piece {
         Ok(numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
     }
 
-    /// Corners of every cell, as indices of points. `section` is `Cells`, or `Polys` of a surface.
+    /// Corners of every cell, as indices of points; of a wedge, a pyramid or a tetrahedron of four nodes those of the hexahedron that it is
+    /// in the mesh. `section` is `Cells`, or `Polys` of a surface.
     ///
     /// # Errors
     /// [`Error::Malformed`], also for corners that are no points.
@@ -224,12 +225,23 @@ impl Piece {
         if corners.iter().any(|&corner| !(0.0..self.n_points as f64).contains(&corner)) {
             return Err(malformed("a corner that is no point"));
         }
+        let types = match section {
+            "Cells" => self.numbers(self.expect(section, "types")?, self.n_cells)?,
+            _ => Vec::new(),
+        };
         let mut cells = Vec::with_capacity(ends.len());
         let mut start = 0;
-        for end in ends {
+        for (i, end) in ends.into_iter().enumerate() {
             let end = end as usize;
             let cell = corners.get(start..end).ok_or_else(|| malformed("offsets of cells do not rise"))?;
-            cells.push(cell.iter().map(|&corner| corner as u32).collect());
+            let cell: Vec<u32> = cell.iter().map(|&corner| corner as u32).collect();
+            let kind = types.get(i).map_or(0, |&kind| kind as u8);
+            cells.push(match (kind, cell[..].len()) {
+                (VTK_WEDGE, 6) => [0, 1, 4, 3, 2, 2, 5, 5].map(|node| cell[node]).to_vec(),
+                (VTK_PYRAMID, 5) => [0, 1, 2, 3, 4, 4, 4, 4].map(|node| cell[node]).to_vec(),
+                (VTK_TETRA, 4) => [0, 1, 2, 2, 3, 3, 3, 3].map(|node| cell[node]).to_vec(),
+                _ => cell,
+            });
             start = end;
         }
         Ok(cells)

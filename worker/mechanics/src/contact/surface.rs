@@ -179,11 +179,12 @@ impl Surface {
                 let corners = part.nodes_of(e);
                 let volume = part.volume_of(e, &mesh.positions);
                 let of_node = part.spacing().node * volume;
+                let shares = part.shares(e);
                 for (corner, n) in corners.iter().map(|&n| index[n as usize] as usize).enumerate() {
                     if n == u32::MAX as usize {
                         continue;
                     }
-                    around[n] += part.shares()[corner] * volume;
+                    around[n] += shares[corner] * volume;
                     if on_faces[nodes[n] as usize] == 0 {
                         continue;
                     }

@@ -24,7 +24,7 @@ use super::{
     place::{Bases, Nodal, PACKED, Packed, Place, Rows},
     rotation::rotation,
     vector::{Tensor, Vector},
-    viscosity::Swing,
+    viscosity::{Spread, Swing},
 };
 use crate::{
     eos::EquationOfState,
@@ -32,7 +32,7 @@ use crate::{
     failure::{FailureLaw, Loading},
     lanes::{Lane, SET, scalar::Scalar},
     state::field,
-    strength::StrengthLaw,
+    strength::{Deviator, History, Memory, StrengthLaw},
 };
 use compression::{Change, Compressed};
 use end::End;
@@ -307,7 +307,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     };
     let compressed = Compressed::of::<E, S, F>(&change, view, slot, laws, step, &memory);
     let Compressed { volume_change, stiffness, sound_square, sound, density, damping, .. } = compressed;
-    let Compressed { viscosity, heating, energy, pressure, temperature, burn, .. } = compressed;
+    let Compressed { viscosity, heating, energy, pressure, burn, .. } = compressed;
     let mut damage_after = damage;
     if laws.failure.fails() || S::REMEMBERS {
         let plastic_strain = [plastic_before, history.plastic_strain];
@@ -376,20 +376,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     // The burn crosses elements faster than sound, and the step follows it.
     let sound_square = if laws.eos.burns() { sound_square.max(burn.pace_square) } else { sound_square };
     let swing = Swing { damping, sound_square, shear_square, trace: spread.trace() * double_inverse_square };
-    let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);
-    let largest = spread.eigenvalue_bound() * double_inverse_square;
-    if L::any(L::both(swing.may_exceed(to_beat, largest), active))
-        && L::any(L::both(L::splat(to_beat).less(swing.frequency(largest)), active))
-    {
-        let exact = swing.frequency(spread.largest_eigenvalue() * double_inverse_square);
-        let (frequencies, limits) = (exact.to_array(), (one / exact).to_array());
-        for lane in 0..L::N {
-            if L::bits(active) >> lane & 1 == 1 {
-                vote.offer_courant(limits[lane], view.elements[slot + lane]);
-                tally.frequency = tally.frequency.max(frequencies[lane]);
-            }
-        }
-    }
+    offer_limit(&swing, &spread, double_inverse_square, active, (view, slot), tally, vote);
     let energy_magic = L::splat(step.energy_quantum.magic());
     let internal = energy * initial_volume;
     let squeezed = -(heating * volume_change * initial_volume);
@@ -399,34 +386,15 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     tally.largest_rate = tally.largest_rate.max(L::select(active, volume_rate.abs(), zero));
 
     // 10. State. Forces act from the first cycle on, so their viscosity is kept from there.
-    view.set_state(slot, field::VISCOSITY, viscosity, active);
-    if step.dt != 0.0 {
-        if laws.strength.deviatoric() {
-            view.set_state(slot, field::SXX, stress.xx, active);
-            view.set_state(slot, field::SYY, stress.yy, active);
-            view.set_state(slot, field::SXY, stress.xy, active);
-            view.set_state(slot, field::SYZ, stress.yz, active);
-            view.set_state(slot, field::SZX, stress.zx, active);
-        }
-        if laws.strength.plastic() {
-            view.set_state(slot, field::PLASTIC_STRAIN, history.plastic_strain, active);
-        }
-        if laws.strength.thermal() {
-            view.set_state(slot, field::TEMPERATURE, temperature, active);
-        }
-        if laws.failure.fails() || S::REMEMBERS {
-            view.set_state(slot, field::DAMAGE, damage_after, active);
-        }
-        if S::REMEMBERS {
-            view.remember(slot, &memory, active);
-        }
-        if laws.eos.burns() {
-            view.set_state(slot, field::TIME_TO_LIGHT, burn.time_to_light, active);
-        }
-        view.set_state(slot, field::PRESSURE, pressure, active);
-        view.set_state(slot, field::ENERGY, energy, active);
-        view.set_state(slot, field::RELATIVE_VOLUME, relative_volume, active);
-    }
+    let kept = Kept {
+        stress,
+        history,
+        damage: damage_after,
+        compressed: &compressed,
+        relative_volume,
+        memory: &memory,
+    };
+    kept.write(view, slot, laws, step, active);
 
     // 11. Corner forces: minus the stress, with the correction of hourglass control, on the volume gradient.
     //     The factor 1/64 takes back what the gradient is too large by.
@@ -452,6 +420,87 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     }
 }
 
+/// What an element is in at the end of a step.
+pub(super) struct Kept<'a, L: Lane> {
+    pub stress: Deviator<L>,
+    pub history: History<L>,
+    pub damage: L,
+    pub compressed: &'a Compressed<L>,
+    pub relative_volume: L,
+    pub memory: &'a Memory<L>,
+}
+
+impl<L: Lane> Kept<'_, L> {
+    /// Writes it for the active lanes. A step of no time changes the viscosity alone.
+    #[inline(always)]
+    pub fn write<E: EquationOfState, S: StrengthLaw, F: FailureLaw>(
+        &self,
+        view: &mut BySlot<'_>,
+        slot: usize,
+        laws: &Laws<E, S, F>,
+        step: &Step,
+        active: L::Mask,
+    ) {
+        let Self { stress, history, compressed, .. } = self;
+        view.set_state(slot, field::VISCOSITY, compressed.viscosity, active);
+        if step.dt == 0.0 {
+            return;
+        }
+        if laws.strength.deviatoric() {
+            view.set_state(slot, field::SXX, stress.xx, active);
+            view.set_state(slot, field::SYY, stress.yy, active);
+            view.set_state(slot, field::SXY, stress.xy, active);
+            view.set_state(slot, field::SYZ, stress.yz, active);
+            view.set_state(slot, field::SZX, stress.zx, active);
+        }
+        if laws.strength.plastic() {
+            view.set_state(slot, field::PLASTIC_STRAIN, history.plastic_strain, active);
+        }
+        if laws.strength.thermal() {
+            view.set_state(slot, field::TEMPERATURE, compressed.temperature, active);
+        }
+        if laws.failure.fails() || S::REMEMBERS {
+            view.set_state(slot, field::DAMAGE, self.damage, active);
+        }
+        if S::REMEMBERS {
+            view.remember(slot, self.memory, active);
+        }
+        if laws.eos.burns() {
+            view.set_state(slot, field::TIME_TO_LIGHT, compressed.burn.time_to_light, active);
+        }
+        view.set_state(slot, field::PRESSURE, compressed.pressure, active);
+        view.set_state(slot, field::ENERGY, compressed.energy, active);
+        view.set_state(slot, field::RELATIVE_VOLUME, self.relative_volume, active);
+    }
+}
+
+/// Offers the limits of the step of active lanes, where one may be the least of all. `spread` times `double_inverse_square` is `2 S / V^2`.
+#[inline(always)]
+pub(super) fn offer_limit<L: Lane>(
+    swing: &Swing<L>,
+    spread: &Spread<L>,
+    double_inverse_square: L,
+    active: L::Mask,
+    (view, slot): (&BySlot<'_>, usize),
+    tally: &mut Tally<L>,
+    vote: &mut ElementVote,
+) {
+    let to_beat = tally.frequency_to_beat(view.lowest[slot / SET], vote);
+    let largest = spread.eigenvalue_bound() * double_inverse_square;
+    if L::any(L::both(swing.may_exceed(to_beat, largest), active))
+        && L::any(L::both(L::splat(to_beat).less(swing.frequency(largest)), active))
+    {
+        let exact = swing.frequency(spread.largest_eigenvalue() * double_inverse_square);
+        let (frequencies, limits) = (exact.to_array(), (L::splat(1.0) / exact).to_array());
+        for lane in 0..L::N {
+            if L::bits(active) >> lane & 1 == 1 {
+                vote.offer_courant(limits[lane], view.elements[slot + lane]);
+                tally.frequency = tally.frequency.max(frequencies[lane]);
+            }
+        }
+    }
+}
+
 /// Votes against the lanes of `bad`, whose elements are turned inside out or hold numbers that are none.
 #[cold]
 #[inline(never)]
@@ -465,7 +514,7 @@ pub(super) fn offer_faults(volumes: &[f64; SET], bad: u32, elements: &[u32], vot
 
 /// The axial vector of the spin of a step, from the velocity gradient and half of the step.
 #[inline(always)]
-fn spin_of<L: Lane>(gradient: &Tensor<L>, half_dt: L) -> Vector<L> {
+pub(super) fn spin_of<L: Lane>(gradient: &Tensor<L>, half_dt: L) -> Vector<L> {
     Vector {
         x: half_dt * (gradient.z.y - gradient.y.z),
         y: half_dt * (gradient.x.z - gradient.z.x),
@@ -476,7 +525,7 @@ fn spin_of<L: Lane>(gradient: &Tensor<L>, half_dt: L) -> Vector<L> {
 /// One component of the corner forces of active elements as it is added: seven corners are rounded, the eighth takes
 /// what they leave, so that the forces of an element add to exactly zero. The largest magnitude before that is kept.
 #[inline(always)]
-fn balanced<L: Lane>(forces: [L; 8], active: L::Mask, magic: L, largest: &mut L) -> [L; 8] {
+pub(super) fn balanced<L: Lane>(forces: [L; 8], active: L::Mask, magic: L, largest: &mut L) -> [L; 8] {
     let zero = L::splat(0.0);
     let mut terms = [zero; 8];
     let mut corner = 0;

@@ -142,17 +142,17 @@ pub(crate) struct Resistance {
     /// The same where an element has failed.
     pub failed: f64,
     /// Of stiffness.
-    stiffness: f64,
+    pub stiffness: f64,
     /// Whether strains are assumed, and not the stiffness.
-    assumes_strain: bool,
+    pub assumes_strain: bool,
     /// `Q 2 G / (1 - nu) / 3` (stress): of bending.
-    bending: f64,
+    pub bending: f64,
     /// Poisson's ratio.
-    poisson: f64,
+    pub poisson: f64,
     /// `Q G / 3` (stress): of twisting.
-    twisting: f64,
+    pub twisting: f64,
     /// `Q E / 9` (stress): of the fourth mode.
-    fourth: f64,
+    pub fourth: f64,
     /// Squared stress of the forces up to which none yields: [`PLASTIC`] times the least yield stress.
     pub sound: f64,
 }

@@ -7,8 +7,15 @@ use super::{
     shell4::Core,
     tet10::group::Tetrahedra,
     truss2::Trusses,
+    uniform::group::Uniform,
 };
-use crate::{material::Material, mesh::Topology, piece::Piece, spin::Turning, state::ShellState};
+use crate::{
+    material::Material,
+    mesh::{Form, Topology},
+    piece::Piece,
+    spin::Turning,
+    state::ShellState,
+};
 
 /// The elements of a piece, whose element arrays they take, and the rotations of its nodes where its kind turns them.
 ///
@@ -17,7 +24,11 @@ use crate::{material::Material, mesh::Topology, piece::Piece, spin::Turning, sta
 pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, Option<Turning>) {
     let n_nodes = piece.nodes.len();
     match &piece.topology {
-        Topology::Structured { .. } | Topology::Explicit { .. } => (Box::new(Solids::of(piece)), None),
+        Topology::Structured { .. } => (Box::new(Solids::of(piece)), None),
+        Topology::Explicit { hexahedra } => match hexahedra.first().map_or(Form::Hexahedron, Form::of) {
+            Form::Hexahedron => (Box::new(Solids::of(piece)), None),
+            form => (Box::new(Uniform::of(piece, form)), None),
+        },
         Topology::EightPoint { .. } => (Box::new(EightPoints::of(piece)), None),
         Topology::Tetrahedra { .. } => (Box::new(Tetrahedra::of(piece)), None),
         Topology::Shells { quads, section } => {

@@ -87,7 +87,7 @@ pub fn body(
         for e in 0..part.n_elements() {
             // A shell has each corner twice.
             let shares = part.nodes_of(e);
-            let places = shares.iter().zip(part.shares());
+            let places = shares.iter().zip(part.shares(e));
             let mut places =
                 places.filter_map(|(n, share)| Some((nodes.binary_search(n).ok()?, share))).peekable();
             if places.peek().is_none() {

@@ -54,7 +54,7 @@ impl Draws {
     }
 }
 
-/// A piece at rest, unstressed, without hourglass control, with the mass of each element spread in eighths.
+/// A piece at rest, unstressed, without hourglass control, with the mass of each element spread as its kind does.
 pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece {
     let nodes: Vec<u32> = (0..x.len() as u32).collect();
     let part = Part {
@@ -71,8 +71,8 @@ pub fn piece(material: &Material, x: Vec<[f64; 3]>, topology: Topology) -> Piece
     for element in 0..n_elements {
         let corners = part.corners(element);
         let volume = hex8::volume(&corners.map(|node| x[node as usize]));
-        for node in corners {
-            mass[node as usize] += material.density * volume / 8.0;
+        for (node, share) in corners.into_iter().zip(part.shares(element)) {
+            mass[node as usize] += material.density * volume * share;
         }
         initial_volume.push(volume);
     }

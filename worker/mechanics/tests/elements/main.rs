@@ -10,4 +10,5 @@ mod energy;
 mod hourglass;
 mod laws;
 mod tet10;
+mod uniform;
 mod waves;

@@ -47,7 +47,7 @@ fn body(material: &Material, x: Vec<[f64; 3]>, tetrahedra: Vec<[u32; tet10::NODE
     let (mut mass, mut initial_volume) = (vec![0.0; n_nodes], Vec::new());
     for element in 0..part.n_elements() {
         let volume = part.volume_of(element, &rest.x);
-        for (&node, share) in part.nodes_of(element).iter().zip(part.shares()) {
+        for (&node, share) in part.nodes_of(element).iter().zip(part.shares(element)) {
             mass[node as usize] += material.density * volume * share;
         }
         initial_volume.push(volume);

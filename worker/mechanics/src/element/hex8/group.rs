@@ -18,7 +18,7 @@ use crate::{
     flip::Target,
     lanes::{SET, scalar::Scalar},
     material::Material,
-    mesh::Topology,
+    mesh::{Form, Topology},
     piece::Piece,
     spin::Turning,
     state::{
@@ -55,8 +55,8 @@ impl Solids {
     /// # Panics
     /// If the arrays do not fit the topology or the hourglass control, or the topology is none of solids.
     pub fn of(piece: &mut Piece) -> Self {
-        let (n_nodes, n_elements) = (piece.nodes.len(), piece.elements.len());
-        let (layout, slots, reach) = match &piece.topology {
+        let n_nodes = piece.nodes.len();
+        let laid_out = match &piece.topology {
             Topology::Structured { cells } => structured(cells.map(|c| c as usize), n_nodes),
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
                 explicit(hexahedra, in_runs(hexahedra), n_nodes)
@@ -69,6 +69,31 @@ impl Solids {
                 panic!("no hexahedra")
             }
         };
+        Self::with(piece, laid_out)
+    }
+
+    /// Those of a piece of wedges, pyramids or tetrahedra: each set by a list of its corners, which are as the kernel of the form
+    /// wants them.
+    ///
+    /// # Panics
+    /// As [`Solids::of`], and if an element is of another form.
+    pub(in crate::element) fn of_form(piece: &mut Piece, form: Form) -> Self {
+        let Topology::Explicit { hexahedra } = &piece.topology else { panic!("no hexahedra") };
+        let turned = |corners: &[u32; 8]| {
+            let (found, turned) = Form::turned(*corners);
+            assert!(found == form, "a {found:?} in a piece of elements {form:?}");
+            turned
+        };
+        let corners: Vec<_> = hexahedra.iter().map(turned).collect();
+        let order = (0..corners.len() as u32).collect();
+        let laid_out =
+            explicit(&corners, (order, vec![None; corners.len().div_ceil(SET)]), piece.nodes.len());
+        Self::with(piece, laid_out)
+    }
+
+    /// The arrays of a piece by slot.
+    fn with(piece: &mut Piece, (layout, slots, reach): (Layout, Slots, usize)) -> Self {
+        let n_elements = piece.elements.len();
         assert!(slots.len() == n_elements, "topology of {} elements, {n_elements} given", slots.len());
         let n_slots = match &layout {
             Layout::Structured { base, .. } => base.len() * SET,
@@ -118,6 +143,22 @@ impl Solids {
     fn own(&self) -> Vec<Vec<f64>> {
         let kept = self.hourglass.iter().filter(|array| !array.is_empty());
         kept.map(|array| self.by_element(array)).collect()
+    }
+
+    /// Hourglass control.
+    pub(in crate::element) fn control(&self) -> Hourglass {
+        self.control
+    }
+
+    /// Forces of elastic hourglass control of the element of a slot; none without it.
+    pub(in crate::element) fn hourglass_of(&self, slot: usize) -> Option<Amplitudes<Scalar>> {
+        let forces = || self.hourglass.each_ref().map(|array| Scalar(array[slot]));
+        self.control.is_elastic().then(|| Amplitudes::from_array(forces()))
+    }
+
+    /// Volume at time zero of the element of a slot.
+    pub(in crate::element) fn initial_volume(&self, slot: usize) -> f64 {
+        self.initial_volume[slot]
     }
 
     /// A field of the element of a slot.
@@ -196,9 +237,7 @@ impl Group for Solids {
         let corners = self.corners_of(slot);
         let at = |of: &[Vec<f64>; 3]| corners.map(|n| [0, 1, 2].map(|axis| of[axis][n as usize]));
         let state = |field: usize| self.fields[field][slot];
-        let is_elastic = self.control.is_elastic();
-        let hourglass = is_elastic
-            .then(|| Amplitudes::from_array(self.hourglass.each_ref().map(|array| Scalar(array[slot]))));
+        let hourglass = self.hourglass_of(slot);
         // The damage that the last step left chose the coefficient of that step.
         let viscous =
             if state(DAMAGE) >= 1.0 { self.control.of_failed(material) } else { self.control.of_whole() };
