@@ -8,6 +8,7 @@ mod bodies;
 mod doubts;
 
 use mechanics::{
+    element::uniform,
     initial::closing_speeds,
     mesh::{CORNERS, Part, Topology},
 };
@@ -251,6 +252,9 @@ impl Sums {
     /// Those of the elements from `first` on with these volumes.
     fn some(model: &Model, part: &Part, first: usize, volumes: &[f64]) -> Self {
         let mut sums = Self::NONE;
+        let material = &model.setup.materials[part.material as usize];
+        let shear = material.shear() / material.wave_modulus();
+        let viscosity = model.setup.control.linear_viscosity;
         for (e, &v) in (first..).zip(volumes) {
             let corners = part.corners(e);
             let x = corners.map(|n| model.mesh.positions[n as usize]);
@@ -260,9 +264,11 @@ impl Sums {
                 Topology::Trusses { .. } | Topology::Beams { .. } => longest,
                 // A third of the least height: a node stands half-way up.
                 Topology::Tetrahedra { .. } => v / largest_side(&x),
-                Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
-                    thinnest_way(&x)
+                Topology::Explicit { .. } => {
+                    let at = |node: u32| model.mesh.positions[node as usize];
+                    uniform::width(&corners, at, shear, viscosity).unwrap_or_else(|| thinnest_way(&x))
                 }
+                Topology::Structured { .. } | Topology::EightPoint { .. } => thinnest_way(&x),
             };
             sums.volume += v;
             sums.area += part.thickness().map_or(0.0, |thickness| v / thickness);

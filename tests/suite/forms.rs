@@ -1,7 +1,10 @@
 //! Wedges, pyramids and tetrahedra of four nodes in whole runs, alone and among hexahedra.
 
 use deck::Model;
-use mechanics::mesh::{FACES, Form};
+use mechanics::{
+    erosion::Criteria,
+    mesh::{FACES, Form},
+};
 use tests::solve::{model, run};
 
 use crate::bits::{losing_a_worker_changes_no_bit, same_bits};
@@ -148,6 +151,10 @@ fn a_bar_of_each_form_shortens_as_one_of_hexahedra_does() {
         let solved = run(struck(|_| of));
         let last = solved.rows.last().expect("rows");
         assert!(last.error.abs() < 0.01, "{of:?}: energy error {}", last.error);
+        // What `bolide check` foretells.
+        let first = deck::physics::forecast(&solved.model).first_step_s.expect("a step") * 1e3;
+        println!("{of:?}: first step {:.4e}, foretold {first:.4e}", solved.rows[0].dt);
+        assert!((first / solved.rows[0].dt - 1.0).abs() < 0.02, "{of:?}: {first} foretold");
         let ends = solved.state.x.iter().map(|x| x[0]);
         let [low, high] = ends.fold([f64::INFINITY, 0.0_f64], |[low, high], x| [low.min(x), high.max(x)]);
         println!(
@@ -197,4 +204,17 @@ fn tetrahedra_of_four_nodes_have_the_same_bits_on_any_workers() {
     let mut model = struck(|_| Cell::Tetrahedra);
     model.setup.control.end_cycle = 120;
     same_bits(&model);
+}
+
+#[test]
+fn forms_that_erode_keep_the_account_of_energy() {
+    for of in [Cell::Wedges(2), Cell::Pyramids, Cell::Tetrahedra] {
+        let mut model = struck(|_| of);
+        let criteria = Criteria { plastic_strain: Some(0.4), ..Criteria::default() };
+        model.setup.erosion.parts = vec![Some(criteria)];
+        let solved = run(model);
+        let (eroded, error) = (solved.state.n_eroded(), solved.rows.last().expect("rows").error);
+        println!("{of:?}: {eroded} eroded, error {error:.1e}");
+        assert!(eroded > 10 && error.abs() < 0.01, "{of:?}: {eroded} eroded, energy error {error}");
+    }
 }

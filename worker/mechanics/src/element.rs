@@ -21,7 +21,7 @@ pub(crate) mod rotation;
 pub mod shell4;
 pub mod tet10;
 pub mod truss2;
-pub(crate) mod uniform;
+pub mod uniform;
 pub(crate) mod vector;
 pub(crate) mod viscosity;
 

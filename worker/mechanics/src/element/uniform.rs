@@ -20,8 +20,38 @@ mod shape;
 mod tetrahedron;
 mod wedge;
 
+use self::{form::none, shape::Shape};
+use crate::{
+    element::{vector::Vector, viscosity::Swing},
+    lanes::scalar::Scalar,
+    mesh::Form,
+};
+
 /// Most nodes of such an element, those of the wedge.
 const MOST: usize = 6;
 
 /// Most motions that hourglass control resists, of a wedge.
 const MODES: usize = 2;
+
+/// Width of the hexahedron that limits the step as much as an element with these corners, whose nodes stand where `at` says (length). `shear` is
+/// the shear modulus of its material over the modulus of waves, `viscosity` the linear coefficient. None of a hexahedron.
+pub fn width(corners: &[u32; 8], at: impl Fn(u32) -> [f64; 3], shear: f64, viscosity: f64) -> Option<f64> {
+    let (form, corners) = Form::turned(*corners);
+    let form = form::Form::of(form)?;
+    let mut x = [none(); MOST];
+    for (x, corner) in x.iter_mut().zip(form.corner).take(form.n_nodes) {
+        let [at_x, at_y, at_z] = at(corners[corner]).map(Scalar);
+        *x = Vector { x: at_x, y: at_y, z: at_z };
+    }
+    let shape = Shape::of(form, &x);
+    let spread = shape.spread(form);
+    let factor = Scalar(2.0) / (shape.volume * shape.volume);
+    let swing = Swing {
+        damping: Scalar(viscosity * shape.volume.0 / (2.0 / 3.0 * spread.trace().0).sqrt()),
+        sound_square: Scalar(1.0),
+        shear_square: Scalar(shear),
+        trace: spread.trace() * factor,
+    };
+    let damped = (1.0 + viscosity * viscosity).sqrt() - viscosity;
+    Some(1.0 / (damped * swing.frequency(spread.largest_eigenvalue() * factor).0))
+}
