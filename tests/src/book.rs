@@ -13,6 +13,7 @@ mod element;
 mod erosion;
 mod exposed;
 mod fold;
+mod form;
 mod free;
 mod friction;
 mod gas;
@@ -108,6 +109,8 @@ macro_rules! each_case_of_the_book {
             structure: a_cantilever_of_assumed_strains_rings_as_a_beam_with_one_layer quick;
             structure: a_cantilever_of_eight_points_is_hardly_softer_than_a_beam long;
             structure: a_cantilever_of_composite_tetrahedra_rings_as_a_beam quick;
+            form: a_cantilever_of_wedges_rings_as_a_beam_with_one_layer quick;
+            form: a_struck_bar_of_each_form_shortens_as_one_of_hexahedra quick;
             spheres: a_ball_keeps_its_motion_for_ten_bounces long;
             spheres: spheres_that_meet_off_centre_part_along_the_line_of_centres long;
             structure: higher_tones_of_a_cantilever_are_those_of_timoshenko_with_that_stiffness long;

@@ -15,6 +15,7 @@ pub mod checker;
 pub mod cluster;
 pub mod failpoint;
 pub mod faults;
+pub mod forms;
 pub mod fuzz;
 pub mod instructions;
 pub mod left;

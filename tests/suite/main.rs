@@ -45,6 +45,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/structure.rs"),
         include_str!("../src/book/shell.rs"),
         include_str!("../src/book/fold.rs"),
+        include_str!("../src/book/form.rs"),
         include_str!("../src/book/free.rs"),
         include_str!("../src/book/girder.rs"),
         include_str!("../src/book/load.rs"),
