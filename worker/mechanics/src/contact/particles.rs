@@ -109,7 +109,7 @@ impl Surface {
                     continue;
                 }
                 let of_element = part.volume_of(e, &mesh.positions);
-                for (&node, share) in corners.iter().zip(part.shares()) {
+                for (&node, share) in corners.iter().zip(part.shares(e)) {
                     if let Some(volume) = volume.get_mut(place[node as usize] as usize) {
                         *volume += share * of_element;
                     }
