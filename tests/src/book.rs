@@ -25,6 +25,7 @@ mod load;
 mod modes;
 mod order;
 mod perforation;
+mod porous;
 mod rigid;
 mod ring;
 mod shell;
@@ -89,6 +90,9 @@ macro_rules! each_case_of_the_book {
             order: shocks_converge_with_the_cells quick;
             order: elastic_waves_and_bent_shells_converge_with_the_square_of_the_cells quick;
             order: taylor_bars_and_blasts_converge_with_the_cells long;
+            law: a_ceramic_breaks_and_bulks_as_johnson_and_holmquist_say quick;
+            porous: shocks_in_a_porous_metal_leave_the_states_of_its_hugoniot quick;
+            porous: a_foam_that_strikes_a_wall_presses_as_reid_and_peng_say quick;
             law: products_have_their_chapman_jouguet_state_and_follow_its_isentrope quick;
             law: a_detonation_runs_at_its_speed_with_its_pressure_behind quick;
             law: detonations_at_default_settings_reach_the_state_of_chapman_and_jouguet quick;
@@ -139,6 +143,7 @@ macro_rules! each_case_of_the_book {
             girder: a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_throughout quick;
             load: a_pressure_by_curve_drives_a_wave_of_its_shape quick;
             load: a_velocity_by_curve_arrives_as_it_was_prescribed quick;
+            load: blasts_have_the_peaks_of_another_published_fit_at_twenty_distances quick;
             load: a_transmitting_face_lets_a_pulse_out quick;
             load: shear_waves_leave_through_a_transmitting_face_too quick;
             load: a_force_by_curve_gives_its_impulse_and_gravity_its_fall quick;
@@ -150,6 +155,7 @@ macro_rules! each_case_of_the_book {
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
             erosion: an_element_that_leaves_a_block_uncovers_its_neighbours quick;
             erosion: a_rod_goes_through_a_plate_and_energies_add_up long;
+            erosion: a_torn_sheet_closes_its_account_of_energy quick;
             erosion: a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_booked quick;
             ring: a_ring_breaks_into_as_many_pieces_as_mott_says quick;
             ring: a_wound_ring_breathes_by_the_modulus_round_it quick;

@@ -84,3 +84,12 @@ pub(super) fn a_punch_of_a_keyword_deck_goes_through_and_what_is_dropped_is_book
     figures.add("punch through plate: energy error", run_totals.last.error);
     figures.add("punch through plate: mass of the eroded over the ledger's", mass_of_the_eroded(&solved));
 }
+
+/// The example of a ball that tears a sheet.
+pub(super) fn a_torn_sheet_closes_its_account_of_energy(figures: &mut Figures) {
+    let solved = run(example("ball-tears-sheet"));
+    let worst = solved.rows.iter().map(|row| row.error.abs()).fold(0.0, f64::max);
+    figures.add("torn sheet: worst energy error", worst);
+    figures.add("torn sheet: eroded elements that come back", f64::from(u8::from(!never_falls(&solved))));
+    assert!(solved.state.n_eroded() > 50, "{} eroded", solved.state.n_eroded());
+}

@@ -377,3 +377,26 @@ pub(super) fn johnson_cook_has_its_point_values_in_an_element(figures: &mut Figu
         }
     }
 }
+
+/// A cube of boron carbide is compressed along one axis, held at its sides, at 7,500 per second: elastic to 2 %, broken and bulked from 4 % on.
+pub(super) fn a_ceramic_breaks_and_bulks_as_johnson_and_holmquist_say(figures: &mut Figures) {
+    let material = of_library("BORON_CARBIDE");
+    let mut block = Block::new(&one(&material, &UNIT_CUBE));
+    let (dt, rate) = (2e-9, -7500.0);
+    let step = bare_step(dt, 1e12, 1e12);
+    let mut length = 1.0;
+    for n in 1..=4000 {
+        carry(&mut block, &material, &step, |x| [rate * x[0] / length, 0.0, 0.0]);
+        length += rate * dt;
+        let percent = match n {
+            1334 => 2,
+            2667 => 4,
+            4000 => 6,
+            _ => continue,
+        };
+        let sigma = stress(&block, 0);
+        figures.add(&format!("boron carbide @ {percent} %, pressure"), block.field(0, field::PRESSURE));
+        figures.add(&format!("boron carbide @ {percent} %, equivalent stress"), sigma[1][1] - sigma[0][0]);
+    }
+    figures.add("boron carbide @ 6 %, damage", block.field(0, field::DAMAGE));
+}

@@ -3,6 +3,7 @@
 //!
 //! Bars are columns of cubes without Poisson's ratio, 200 GPa and 8000 kg/m3: waves of 5000 m/s, 40 MPa s/m.
 
+use mechanics::load::blast::{Burst, Wave};
 use protocol::options::JobOptions;
 
 use crate::{
@@ -221,4 +222,16 @@ pub(super) fn a_body_between_a_sphere_and_a_cylinder_stays_outside_both(figures:
     let bent = solved.state.x.iter().map(|x| x[2]).fold(f64::MAX, f64::min);
     assert!(bent < -1e-4, "the blank bends over the cylinder: {bent}");
     figures.add("die: energy error", last.error);
+}
+
+/// Peaks of the waves of one kilogram on the ground at twenty distances.
+pub(super) fn blasts_have_the_peaks_of_another_published_fit_at_twenty_distances(figures: &mut Figures) {
+    for i in 0..20 {
+        let scaled = 0.2 * 200f64.powf(f64::from(i) / 19.5);
+        let wave = Wave::at(Burst::Surface, scaled, 1.0);
+        figures.add(&format!("blast on the ground @ {scaled:.4} m, incident peak (kPa)"), wave.peaks[0]);
+        if scaled < 2.0 {
+            figures.add(&format!("blast on the ground @ {scaled:.4} m, reflected peak (kPa)"), wave.peaks[1]);
+        }
+    }
 }

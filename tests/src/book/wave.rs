@@ -356,7 +356,7 @@ fn shocked([density, c0, s, gamma]: [f64; 4], strength: &str) -> String {
 const HYDRO: &str = "{ type = \"hydro\" }";
 
 /// Flyer of 0.1 m on a target of as much, 100 cells each, until the faster shock has gone through four fifths.
-struct Collision {
+pub(super) struct Collision {
     solved: Solved,
     density: [f64; 2],
     /// Where the shocks are, about: initial positions.
@@ -370,7 +370,7 @@ fn collide(flyer: [f64; 4], target: [f64; 4], velocity: f64) -> Collision {
 }
 
 /// Material, density and about the shock speed of each side.
-fn collide_of(flyer: (String, f64, f64), target: (String, f64, f64), velocity: f64) -> Collision {
+pub(super) fn collide_of(flyer: (String, f64, f64), target: (String, f64, f64), velocity: f64) -> Collision {
     let ((first, flyer_density, flyer_speed), (second, target_density, target_speed)) = (flyer, target);
     let parts = [
         Bar { name: "flyer", from: -0.1, length: 0.1, cells: 100, velocity, material: &first },
@@ -397,11 +397,11 @@ impl Collision {
         move |[x, _, _]: [f64; 3]| (0.15 * front..0.8 * front).contains(&x.abs())
     }
 
-    fn pressure(&self, side: usize) -> f64 {
+    pub(super) fn pressure(&self, side: usize) -> f64 {
         self.mean(side, &|s, e| s.elements[field::PRESSURE][e])
     }
 
-    fn density(&self, side: usize) -> f64 {
+    pub(super) fn density(&self, side: usize) -> f64 {
         self.density[side] / self.mean(side, &|s, e| s.elements[field::RELATIVE_VOLUME][e])
     }
 
@@ -422,7 +422,7 @@ impl Collision {
     }
 
     /// Shock speed through undeformed material, from arrivals at half the jump.
-    fn shock(&self, side: usize, velocity: f64) -> f64 {
+    pub(super) fn shock(&self, side: usize, velocity: f64) -> f64 {
         let (gauges, before) = if side == 1 { ([0, 1], 0.0) } else { ([2, 3], velocity) };
         let level = 0.5 * (before + self.velocity());
         let [near, far] = gauges.map(|g| {
