@@ -124,7 +124,7 @@ fn energies_add_up_wherever_they_are_shown() {
         adds_up(&shown.iter().map(|(_, value)| *value).collect::<Vec<_>>(), total, 2e-5, "report");
         eroding += usize::from(solved.rows.last().is_some_and(|row| row.eroded != 0.0));
     }
-    assert_eq!(eroding, 5, "examples that lost energy by erosion");
+    assert_eq!(eroding, 6, "examples that lost energy by erosion");
 }
 
 /// Momenta of parts are exact sums: those of all parts are the momentum to the bit.
