@@ -139,7 +139,9 @@ impl StrengthLaw for LowDensity {
         }
         let greatest = memory.variables[GREATEST].max(energy);
         memory.variables[GREATEST] = greatest;
-        memory.added_stiffness = stiffest;
+        // What is pressed by a hair may be pulled by one in the next cycle.
+        let young = L::splat(self.law.young);
+        memory.added_stiffness = stiffest.max(young);
         let lost = 1.0 - self.law.hysteresis;
         if lost > 0.0 {
             let some = zero.less(greatest);
@@ -147,11 +149,12 @@ impl StrengthLaw for LowDensity {
             let left = pow(part, L::splat(self.law.shape));
             let factor = L::splat(lost).mul_add(left - one, one);
             stress = [stress[0] * factor, stress[1] * factor, stress[2] * factor];
-            // As the factor falls, the stress does with it.
-            let steep = L::splat(lost * self.law.shape) * left * largest * inverse;
-            memory.added_stiffness =
-                L::select(some, steep / L::select(some, energy, one).max(L::splat(f64::MIN_POSITIVE)), zero)
-                    + stiffest;
+            // As the factor falls, the stress does with it: most where unloading begins, and from a small strain, where the square of the stress
+            // is twice E times the energy, as much as ever. The step knows that before anything is loaded.
+            let held = zero.less(energy);
+            let square = largest / L::select(held, energy, one).max(L::splat(f64::MIN_POSITIVE));
+            let steep = L::select(held, square, zero).max(young + young) * inverse;
+            memory.added_stiffness = L::splat(lost * self.law.shape).mul_add(steep, memory.added_stiffness);
         }
         let mean = (stress[0] + stress[1] + stress[2]) * third;
         memory.added_pressure = -mean - around.pressure;
