@@ -29,6 +29,7 @@ pub(crate) mod low_density_foam;
 pub(crate) mod material_axes;
 pub(crate) mod modified_johnson_cook;
 pub(crate) mod mooney_rivlin;
+pub(crate) mod newton;
 mod of_material;
 pub(crate) mod ogden;
 pub(crate) mod orthotropic;

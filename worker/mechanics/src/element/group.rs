@@ -29,6 +29,75 @@ pub(crate) struct Call<'a> {
     pub width: Width,
 }
 
+impl Call<'_> {
+    /// Whether a block of so many sets, whose kernels touch so many entries of a node array, can be computed.
+    ///
+    /// # Panics
+    /// If a set is out of range or node arrays are shorter.
+    pub(crate) fn check(&self, n_sets: usize, reach: usize, nodes: &Nodal<'_>) {
+        let sets = self.sets;
+        assert!(sets.iter().all(|r| r.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
+        let arrays = nodes.x.iter().chain(&nodes.v).map(|a| a.len());
+        let shortest = arrays.chain(nodes.f.iter().map(|a| a.len())).min().unwrap_or(0);
+        assert!(shortest >= reach, "node arrays shrunk to {shortest}, below {reach}");
+    }
+}
+
+/// The methods of [`Group`] of a kind that leaves its slots, and what the element as a whole keeps, to the field `solids`.
+macro_rules! slots_of_solids {
+    () => {
+        fn reach(&self) -> usize {
+            self.solids.reach()
+        }
+
+        fn alive(&self) -> &[u8] {
+            self.solids.alive()
+        }
+
+        fn alive_mut(&mut self) -> &mut [u8] {
+            self.solids.alive_mut()
+        }
+
+        fn n_elements(&self) -> usize {
+            self.solids.n_elements()
+        }
+
+        fn global(&self, slot: usize) -> u32 {
+            self.solids.global(slot)
+        }
+
+        fn slot(&self, element: usize) -> usize {
+            self.solids.slot(element)
+        }
+
+        fn corners(&self, element: usize) -> [u32; 8] {
+            self.solids.corners(element)
+        }
+
+        fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
+            self.solids.element(element, x)
+        }
+
+        fn variables(&self, slot: usize) -> Vec<f64> {
+            self.solids.variables(slot)
+        }
+
+        fn take_out(&mut self, slot: usize) -> (u32, f64) {
+            self.solids.take_out(slot)
+        }
+
+        /// By the corners alone: the limits of erosion see an element as if its edges were straight.
+        fn scanned(&self) -> Option<Scanned<'_>> {
+            self.solids.scanned()
+        }
+
+        fn first_stress(&mut self) -> Option<&mut f64> {
+            self.solids.first_stress()
+        }
+    };
+}
+pub(crate) use slots_of_solids;
+
 /// Element arrays of a [`Piece`], by local element.
 pub(crate) struct ElementArrays {
     /// Volume at time zero.

@@ -9,7 +9,7 @@ pub(super) mod compression;
 pub mod eight_points;
 mod end;
 pub(crate) mod group;
-mod leaving;
+pub(super) mod leaving;
 mod pass;
 pub(crate) mod points;
 pub(super) mod stress;

@@ -4,7 +4,7 @@
 //! H. W. Swift, Plastic instability under plane stress, J. Mech. Phys. Solids 1 (1952) 1. The strain at first yield keeps the slope finite
 //! where Johnson and Cook's power has none.
 
-use super::{CowperSymonds, Deviator, History, RateFactor, Strain, StrengthLaw};
+use super::{CowperSymonds, Deviator, History, RateFactor, Strain, StrengthLaw, newton};
 use crate::{
     lanes::{Lane, functions::pow, scalar::Scalar},
     law::declared,
@@ -48,11 +48,6 @@ impl Power {
     }
 }
 
-/// Most Newton steps of the return. The difference is convex in the increment, or concave where n is above 1, so steps come from one side.
-const STEPS: usize = 12;
-/// A lane stops after a step of this part of its increment: the next would be smaller than its rounding.
-const SMALL: f64 = 1e-9;
-
 impl StrengthLaw for Power {
     #[inline(always)]
     fn shear(&self) -> f64 {
@@ -76,7 +71,6 @@ impl StrengthLaw for Power {
         self.rate.at(rate)
     }
 
-    /// The implicit return `sigma - 3 G d = Y(e + d)`, by Newton's steps.
     #[inline(always)]
     fn update<L: Lane>(
         &self,
@@ -85,11 +79,10 @@ impl StrengthLaw for Power {
         history: &mut History<L>,
         active: L::Mask,
     ) -> Deviator<L> {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let sigma = trial.mises_square().sqrt();
         let before = history.plastic_strain;
         // Elements that stay below the first yield stress need no power.
-        if !L::any(L::both(self.least_flow(before, zero).less(sigma), active)) {
+        if !L::any(L::both(self.least_flow(before, history.temperature).less(sigma), active)) {
             return trial;
         }
         let rate = self.rate.at(strain.rate);
@@ -97,20 +90,7 @@ impl StrengthLaw for Power {
         if !L::any(L::both(yields, active)) {
             return trial;
         }
-        let three_g = L::splat(3.0 * self.law.shear);
-        let mut slip = zero;
-        let mut open = yields;
-        let mut step = 0;
-        while step < STEPS && L::any(open) {
-            let (flow, slope) = self.flow(before + slip, rate);
-            let change = (three_g.neg_mul_add(slip, sigma) - flow) / (three_g + slope);
-            slip = L::select(open, slip + change, slip);
-            open = L::both(open, (L::splat(SMALL) * slip).less(change.abs()));
-            step += 1;
-        }
-        history.plastic_strain = before + slip;
-        let factor = three_g.neg_mul_add(slip, sigma).max(zero) / sigma;
-        trial.scaled(L::select(yields, factor, one))
+        newton::returned(self, &trial, sigma, rate, yields, history)
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! E. Voce, The relationship between stress and strain for homogeneous deformation, J. Inst. Metals 74 (1948) 537.
 
-use super::{Deviator, History, Strain, StrengthLaw};
+use super::{Deviator, History, Strain, StrengthLaw, newton};
 use crate::{
     lanes::{Lane, functions::exp},
     law::declared,
@@ -22,11 +22,6 @@ declared! {
     }
 }
 
-/// Most Newton steps of the return. The difference is convex in the increment, so steps from zero come from one side.
-const STEPS: usize = 12;
-/// A lane stops after a step of this part of its increment: the next would be smaller than its rounding.
-const SMALL: f64 = 1e-9;
-
 impl StrengthLaw for Voce {
     #[inline(always)]
     fn shear(&self) -> f64 {
@@ -45,7 +40,6 @@ impl StrengthLaw for Voce {
         L::splat(self.yield_stress)
     }
 
-    /// The implicit return `sigma - 3 G d = Y(e + d)`, by Newton's steps.
     #[inline(always)]
     fn update<L: Lane>(
         &self,
@@ -54,27 +48,13 @@ impl StrengthLaw for Voce {
         history: &mut History<L>,
         active: L::Mask,
     ) -> Deviator<L> {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let one = L::splat(1.0);
         let sigma = trial.mises_square().sqrt();
-        let before = history.plastic_strain;
-        let yields = self.flow(before, one).0.less(sigma);
+        let yields = self.flow(history.plastic_strain, one).0.less(sigma);
         if !L::any(L::both(yields, active)) {
             return trial;
         }
-        let three_g = L::splat(3.0 * self.shear);
-        let mut slip = zero;
-        let mut open = yields;
-        let mut step = 0;
-        while step < STEPS && L::any(open) {
-            let (flow, slope) = self.flow(before + slip, one);
-            let change = (three_g.neg_mul_add(slip, sigma) - flow) / (three_g + slope);
-            slip = L::select(open, slip + change, slip);
-            open = L::both(open, (L::splat(SMALL) * slip).less(change.abs()));
-            step += 1;
-        }
-        history.plastic_strain = before + slip;
-        let factor = three_g.neg_mul_add(slip, sigma).max(zero) / sigma;
-        trial.scaled(L::select(yields, factor, one))
+        newton::returned(self, &trial, sigma, one, yields, history)
     }
 }
 

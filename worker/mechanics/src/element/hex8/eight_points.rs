@@ -19,7 +19,7 @@ use super::{
 use crate::{
     element::{
         ElementVote, Step,
-        group::{Call, ElementArrays, Group, Scanned},
+        group::{Call, ElementArrays, Group, Scanned, slots_of_solids},
         hourglass::{Hourglass, Resistance},
         place::Nodal,
     },
@@ -161,33 +161,7 @@ impl Task for Pass<'_> {
 }
 
 impl Group for EightPoints {
-    fn reach(&self) -> usize {
-        self.solids.reach()
-    }
-
-    fn alive(&self) -> &[u8] {
-        self.solids.alive()
-    }
-
-    fn alive_mut(&mut self) -> &mut [u8] {
-        self.solids.alive_mut()
-    }
-
-    fn n_elements(&self) -> usize {
-        self.solids.n_elements()
-    }
-
-    fn global(&self, slot: usize) -> u32 {
-        self.solids.global(slot)
-    }
-
-    fn slot(&self, element: usize) -> usize {
-        self.solids.slot(element)
-    }
-
-    fn corners(&self, element: usize) -> [u32; 8] {
-        self.solids.corners(element)
-    }
+    slots_of_solids!();
 
     fn compute(
         &mut self,
@@ -197,11 +171,7 @@ impl Group for EightPoints {
         vote: &mut ElementVote,
     ) {
         let Call { material, sets, step, width } = *call;
-        let (n_sets, reach) = (self.alive().len(), self.reach());
-        assert!(sets.iter().all(|r| r.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
-        let arrays = nodes.x.iter().chain(&nodes.v).map(|a| a.len());
-        let shortest = arrays.chain(nodes.f.iter().map(|a| a.len())).min().unwrap_or(0);
-        assert!(shortest >= reach, "node arrays shrunk to {shortest}, below {reach}");
+        call.check(self.alive().len(), self.reach(), &nodes);
         let laws = Laws {
             density: material.density,
             eos: AnyEos::of(material),
@@ -211,10 +181,6 @@ impl Group for EightPoints {
         };
         let points = self.points.each_mut().map(Vec::as_mut_slice);
         width.run(Pass { solids: &mut self.solids, points, nodes, laws, step, sets, vote });
-    }
-
-    fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
-        self.solids.element(element, x)
     }
 
     fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays {
@@ -236,21 +202,9 @@ impl Group for EightPoints {
         }
     }
 
-    fn take_out(&mut self, slot: usize) -> (u32, f64) {
-        self.solids.take_out(slot)
-    }
-
     /// By the mean stress of the points: what holds the modes is left out.
     fn half_work(&self, slot: usize, moved: [&[Vec<f64>; 3]; 2], dt: f64, material: &Material) -> f64 {
         self.solids.half_work(slot, moved, dt, material)
-    }
-
-    fn scanned(&self) -> Option<Scanned<'_>> {
-        self.solids.scanned()
-    }
-
-    fn first_stress(&mut self) -> Option<&mut f64> {
-        self.solids.first_stress()
     }
 
     fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {

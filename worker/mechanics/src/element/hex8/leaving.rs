@@ -6,6 +6,7 @@
 use super::super::{
     hourglass::{Amplitudes, amplitude},
     modes::{Gradient, Modes, modes_of},
+    vector::Tensor,
     viscosity::Spread,
 };
 use crate::{lanes::scalar::Scalar, strength::Deviator};
@@ -27,6 +28,22 @@ pub(super) struct Leaving<'a> {
     pub viscous: f64,
 }
 
+/// Power of a stress, deviatoric xx, yy, xy, yz, zx and pressure, at a velocity gradient, per volume of that.
+pub(in crate::element) fn power(rate: &Tensor<Scalar>, deviator: [f64; 5], pressure: f64) -> f64 {
+    let [xx, yy, xy, yz, zx] = deviator.map(Scalar);
+    let stress = Deviator { xx, yy, zz: -(xx + yy), xy, yz, zx };
+    let along = Deviator {
+        xx: rate.x.x,
+        yy: rate.y.y,
+        zz: rate.z.z,
+        xy: Scalar(0.5) * (rate.x.y + rate.y.x),
+        yz: Scalar(0.5) * (rate.y.z + rate.z.y),
+        zx: Scalar(0.5) * (rate.z.x + rate.x.z),
+    };
+    let volume_rate = rate.x.x + rate.y.y + rate.z.z;
+    (stress.contract(&along) - Scalar(pressure) * volume_rate).0
+}
+
 impl Leaving<'_> {
     /// Energy that the element takes of its nodes in the last half of a step, by forces of the first; negative where they push them.
     ///
@@ -40,18 +57,7 @@ impl Leaving<'_> {
         let before = Modes::before(&modes(&self.x), &v, Scalar(self.dt));
         let geometry = Gradient::of(&before);
         let rate = geometry.against(&v);
-        let [xx, yy, xy, yz, zx] = self.deviator.map(Scalar);
-        let stress = Deviator { xx, yy, zz: -(xx + yy), xy, yz, zx };
-        let along = Deviator {
-            xx: rate.x.x,
-            yy: rate.y.y,
-            zz: rate.z.z,
-            xy: Scalar(0.5) * (rate.x.y + rate.y.x),
-            yz: Scalar(0.5) * (rate.y.z + rate.z.y),
-            zx: Scalar(0.5) * (rate.z.x + rate.x.z),
-        };
-        let volume_rate = rate.x.x + rate.y.y + rate.z.z;
-        let of_stress = (stress.contract(&along) - Scalar(self.pressure) * volume_rate) * Scalar(1.0 / 64.0);
+        let of_stress = power(&rate, self.deviator, self.pressure) * (1.0 / 64.0);
         let gradient = rate.scaled(Scalar(1.0) / geometry.volume_times_64);
         let q = Amplitudes {
             d: amplitude(&v.d, &gradient, &before.d),
@@ -64,6 +70,6 @@ impl Leaving<'_> {
             Spread::of([&geometry.a, &geometry.b, &geometry.c, &geometry.d, &geometry.e, &geometry.f]);
         let area = (2.0 / 3.0 / 512.0 * spread.trace().0).sqrt();
         let resist = 2.0 * self.viscous * area / geometry.volume().0;
-        0.5 * self.dt * ((of_stress.0 + of_modes) + resist * q.square().0 / 8.0)
+        0.5 * self.dt * ((of_stress + of_modes) + resist * q.square().0 / 8.0)
     }
 }

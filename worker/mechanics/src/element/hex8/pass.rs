@@ -26,11 +26,8 @@ use crate::{
 /// [`SET`](crate::lanes::SET) lanes behind it in a structured layout.
 pub(super) unsafe fn run(view: View<'_>, call: &Call<'_>, control: Hourglass, vote: &mut ElementVote) {
     let Call { material, sets, step, width } = *call;
-    let (n_sets, reach) = (view.slots.alive.len(), view.reach);
-    assert!(sets.iter().all(|r| r.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
-    let arrays = view.nodes.x.iter().chain(&view.nodes.v).map(|a| a.len());
-    let shortest = arrays.chain(view.nodes.f.iter().map(|a| a.len())).min().unwrap_or(0);
-    assert!(shortest >= reach, "node arrays shrunk to {shortest}, below {reach}");
+    let n_sets = view.slots.alive.len();
+    call.check(n_sets, view.reach, &view.nodes);
     let elastic = control.is_elastic();
     let n_forces = if elastic { n_sets * SET } else { 0 };
     assert!(

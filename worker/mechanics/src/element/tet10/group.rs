@@ -7,7 +7,7 @@ use super::{BY_POINT, N_OWN, NODES, OF_POINT, POINTS, SHOWN, SWELLING, kernel, l
 use crate::{
     element::{
         ElementVote, Step,
-        group::{Call, ElementArrays, Group, Scanned},
+        group::{Call, ElementArrays, Group, Scanned, slots_of_solids},
         hex8::{BySlot, Laws, Tally, group::Solids},
         hourglass::{Hourglass, Resistance},
         place::Nodal,
@@ -180,33 +180,7 @@ impl<S: StrengthLaw, F: FailureLaw> Task for Pass<'_, S, F> {
 }
 
 impl Group for Tetrahedra {
-    fn reach(&self) -> usize {
-        self.solids.reach()
-    }
-
-    fn alive(&self) -> &[u8] {
-        self.solids.alive()
-    }
-
-    fn alive_mut(&mut self) -> &mut [u8] {
-        self.solids.alive_mut()
-    }
-
-    fn n_elements(&self) -> usize {
-        self.solids.n_elements()
-    }
-
-    fn global(&self, slot: usize) -> u32 {
-        self.solids.global(slot)
-    }
-
-    fn slot(&self, element: usize) -> usize {
-        self.solids.slot(element)
-    }
-
-    fn corners(&self, element: usize) -> [u32; 8] {
-        self.solids.corners(element)
-    }
+    slots_of_solids!();
 
     fn nodes(&self, element: usize) -> Nodes {
         Nodes::of(self.nodes_of(self.slot(element)))
@@ -219,12 +193,9 @@ impl Group for Tetrahedra {
         call: &Call<'_>,
         vote: &mut ElementVote,
     ) {
-        let Call { material, sets, .. } = *call;
-        let (n_sets, reach) = (self.alive().len(), self.reach());
-        assert!(sets.iter().all(|r| r.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
-        let arrays = nodes.x.iter().chain(&nodes.v).map(|a| a.len());
-        let shortest = arrays.chain(nodes.f.iter().map(|a| a.len())).min().unwrap_or(0);
-        assert!(shortest >= reach, "node arrays shrunk to {shortest}, below {reach}");
+        let Call { material, .. } = *call;
+        let n_sets = self.alive().len();
+        call.check(n_sets, self.reach(), &nodes);
         let (density, eos) = (material.density, AnyEos::of(material));
         let hourglass = Resistance::of_points(material);
         if let Some(strength) = AnyRemembering::of(material) {
@@ -236,14 +207,6 @@ impl Group for Tetrahedra {
         }
         let (strength, failure) = (AnyStrength::of(material), AnyFailure::of(material));
         self.pass(nodes, Laws { density, eos, strength, failure, hourglass }, call, vote);
-    }
-
-    fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
-        self.solids.element(element, x)
-    }
-
-    fn variables(&self, slot: usize) -> Vec<f64> {
-        self.solids.variables(slot)
     }
 
     fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays {
@@ -262,25 +225,12 @@ impl Group for Tetrahedra {
         }
     }
 
-    fn take_out(&mut self, slot: usize) -> (u32, f64) {
-        self.solids.take_out(slot)
-    }
-
     fn half_work(&self, slot: usize, [x, v]: [&[Vec<f64>; 3]; 2], dt: f64, _material: &Material) -> f64 {
         let nodes = self.nodes_of(slot);
         let at = |of: &[Vec<f64>; 3]| nodes.map(|n| [0, 1, 2].map(|axis| of[axis][n as usize]));
         let points = self.points.each_ref().map(|point| [0, 1, 2, 3, 4, SWELLING].map(|k| point[k][slot]));
         let pressure = self.solids.field(PRESSURE, slot) + self.solids.field(VISCOSITY, slot);
         Leaving { x: at(x), v: at(v), dt, points, pressure }.half_work()
-    }
-
-    /// By the corners alone: the limits of erosion see an element as if its edges were straight.
-    fn scanned(&self) -> Option<Scanned<'_>> {
-        self.solids.scanned()
-    }
-
-    fn first_stress(&mut self) -> Option<&mut f64> {
-        self.solids.first_stress()
     }
 
     fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {

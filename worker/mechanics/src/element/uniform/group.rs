@@ -11,7 +11,7 @@ use super::{
 use crate::{
     element::{
         ElementVote, Step,
-        group::{Call, ElementArrays, Group, Scanned},
+        group::{Call, ElementArrays, Group, Scanned, slots_of_solids},
         hex8::{BySlot, Laws, Tally, group::Solids},
         hourglass::Resistance,
         layout::{Corners, Layout},
@@ -118,33 +118,7 @@ impl<S: StrengthLaw, F: FailureLaw> Task for Pass<'_, S, F> {
 }
 
 impl Group for Uniform {
-    fn reach(&self) -> usize {
-        self.solids.reach()
-    }
-
-    fn alive(&self) -> &[u8] {
-        self.solids.alive()
-    }
-
-    fn alive_mut(&mut self) -> &mut [u8] {
-        self.solids.alive_mut()
-    }
-
-    fn n_elements(&self) -> usize {
-        self.solids.n_elements()
-    }
-
-    fn global(&self, slot: usize) -> u32 {
-        self.solids.global(slot)
-    }
-
-    fn slot(&self, element: usize) -> usize {
-        self.solids.slot(element)
-    }
-
-    fn corners(&self, element: usize) -> [u32; 8] {
-        self.solids.corners(element)
-    }
+    slots_of_solids!();
 
     fn compute(
         &mut self,
@@ -153,12 +127,8 @@ impl Group for Uniform {
         call: &Call<'_>,
         vote: &mut ElementVote,
     ) {
-        let Call { material, sets, .. } = *call;
-        let (n_sets, reach) = (self.alive().len(), self.reach());
-        assert!(sets.iter().all(|r| r.end as usize <= n_sets), "sets {sets:?} of a block of {n_sets}");
-        let arrays = nodes.x.iter().chain(&nodes.v).map(|a| a.len());
-        let shortest = arrays.chain(nodes.f.iter().map(|a| a.len())).min().unwrap_or(0);
-        assert!(shortest >= reach, "node arrays shrunk to {shortest}, below {reach}");
+        let Call { material, .. } = *call;
+        call.check(self.alive().len(), self.reach(), &nodes);
         let (n_columns, n_variables) = (self.solids.n_columns(), material.history().len());
         assert!(n_columns == n_variables, "{n_columns} columns for {n_variables} history variables");
         let (density, eos) = (material.density, AnyEos::of(material));
@@ -171,14 +141,6 @@ impl Group for Uniform {
         self.pass(nodes, Laws { density, eos, strength, failure, hourglass }, call, vote);
     }
 
-    fn element(&self, element: usize, x: &[Vec<f64>; 3]) -> [f64; N_FIELDS] {
-        self.solids.element(element, x)
-    }
-
-    fn variables(&self, slot: usize) -> Vec<f64> {
-        self.solids.variables(slot)
-    }
-
     fn image(&self, x: &[Vec<f64>; 3]) -> ElementArrays {
         self.solids.image(x)
     }
@@ -189,10 +151,6 @@ impl Group for Uniform {
 
     fn visit(&self, visit: &mut dyn FnMut(f64)) {
         self.solids.visit(visit);
-    }
-
-    fn take_out(&mut self, slot: usize) -> (u32, f64) {
-        self.solids.take_out(slot)
     }
 
     fn half_work(&self, slot: usize, [x, v]: [&[Vec<f64>; 3]; 2], dt: f64, material: &Material) -> f64 {
@@ -217,14 +175,6 @@ impl Group for Uniform {
             viscous: viscous * mass * material.sound_speed(),
         };
         leaving.half_work(self.form)
-    }
-
-    fn scanned(&self) -> Option<Scanned<'_>> {
-        self.solids.scanned()
-    }
-
-    fn first_stress(&mut self) -> Option<&mut f64> {
-        self.solids.first_stress()
     }
 
     fn numbers_mut(&mut self, target: Target) -> Vec<&mut [f64]> {

@@ -6,7 +6,10 @@ use super::{
     form::{ByMode, Form, dot, none},
     shape::Shape,
 };
-use crate::{element::vector::Vector, lanes::scalar::Scalar, strength::Deviator};
+use crate::{
+    element::{hex8::leaving::power, vector::Vector},
+    lanes::scalar::Scalar,
+};
 
 /// What an element had at `x_{n-1}`, and how its nodes moved since.
 pub(super) struct Leaving {
@@ -35,18 +38,7 @@ impl Leaving {
         let v = self.v.map(vector);
         let shape = Shape::of(form, &before);
         let rate = shape.against(&v);
-        let [xx, yy, xy, yz, zx] = self.deviator.map(Scalar);
-        let stress = Deviator { xx, yy, zz: -(xx + yy), xy, yz, zx };
-        let along_rate = Deviator {
-            xx: rate.x.x,
-            yy: rate.y.y,
-            zz: rate.z.z,
-            xy: Scalar(0.5) * (rate.x.y + rate.y.x),
-            yz: Scalar(0.5) * (rate.y.z + rate.z.y),
-            zx: Scalar(0.5) * (rate.z.x + rate.x.z),
-        };
-        let volume_rate = rate.x.x + rate.y.y + rate.z.z;
-        let of_stress = stress.contract(&along_rate) - Scalar(self.pressure) * volume_rate;
+        let of_stress = power(&rate, self.deviator, self.pressure);
         let gradient = rate.scaled(Scalar(1.0) / shape.volume);
         let (of_v, of_x) = (form.along(&v), form.along(&before));
         let mut amplitudes = [none(); MODES];
@@ -56,6 +48,6 @@ impl Leaving {
         let area = (2.0 / 3.0 * shape.spread(form).trace().0).sqrt();
         let resist = 8.0 / form.n_nodes as f64 * 2.0 * self.viscous * area / shape.volume.0;
         let of_modes = dot(&self.elastic, &amplitudes).0 + resist * dot(&amplitudes, &amplitudes).0;
-        0.5 * self.dt * (of_stress.0 + of_modes)
+        0.5 * self.dt * (of_stress + of_modes)
     }
 }
