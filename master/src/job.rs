@@ -228,7 +228,7 @@ impl Job {
         })));
     }
 
-    /// Frames of an older epoch say nothing any more; those of a later one nobody can have sent.
+    /// Frames of an older epoch say nothing any more, but that their sender is to go; those of a later one nobody can have sent.
     fn receive(
         &mut self,
         index: usize,
@@ -238,6 +238,9 @@ impl Job {
     ) -> Result<(), Error> {
         let now = self.epoch.number;
         if epoch < now {
+            if matches!(message, ToMaster::Leaving) {
+                self.workers.leave(index, Goes::Ends);
+            }
             return Ok(());
         }
         match self.epoch.position(index) {

@@ -1,6 +1,6 @@
 //! Workers that die, that come, and nobody left, as real processes: the run goes on, with the same bits and files.
 
-use std::{fs, path::Path, sync::OnceLock};
+use std::{fs, path::Path, sync::OnceLock, time::Duration};
 
 use tests::cluster::{Cluster, Process, said, until};
 
@@ -122,6 +122,26 @@ fn a_job_whose_workers_all_died_waits_for_one_and_goes_on() {
     cluster.worker("new", "1");
     let summary = same_as_undisturbed(&cluster, &mut waiting);
     assert_eq!((summary["losses"].as_array().map(Vec::len), &summary["workers"]), (Some(2), &1.into()));
+}
+
+/// As a batch system tells the processes of a job that is preempted: all, one shortly after the other.
+#[test]
+fn workers_told_to_leave_one_after_another_leave_the_job_waiting() {
+    let names = ["a", "b", "c", "d"];
+    let (mut cluster, mut waiting) = running(&names, &[]);
+    wait_for_cycle(&cluster, 500);
+    for name in names {
+        cluster.process(name).signal("TERM");
+        std::thread::sleep(Duration::from_millis(3));
+    }
+    for name in names {
+        assert_eq!(cluster.process_mut(name).wait().code(), Some(0));
+    }
+    cluster.master.wait_for("work is dealt out job=1 workers=0");
+    assert_eq!(cluster.job(1)["state"], "running", "it is not done: nobody has stayed to its end");
+    cluster.worker("e", "1");
+    let summary = same_as_undisturbed(&cluster, &mut waiting);
+    assert_eq!(summary["losses"].as_array().map(Vec::len), Some(0), "{summary}");
 }
 
 #[test]

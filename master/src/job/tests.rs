@@ -8,7 +8,7 @@ use protocol::{
     options::{Balance, JobOptions},
 };
 
-use super::Job;
+use super::{Job, workers::Goes};
 use crate::{
     event::{Action, Event, WorkerSpec},
     options::SessionOptions,
@@ -146,6 +146,16 @@ fn the_work_of_a_lost_worker_is_dealt_to_the_others_in_a_new_epoch() {
     assert!(job.apply(Event::Message(1, 0, cycle(0, exchange[1]))).is_empty(), "of the lost one");
     let actions = job.apply(Event::Message(1, 1, cycle(0, exchange[1])));
     assert!(failure(&actions).contains("worker 1 sends a message of epoch 1, which it was not dealt"));
+}
+
+/// Its word crosses the deal of work for another one that goes: without it the worker would stay to the end of the job.
+#[test]
+fn a_worker_that_says_it_leaves_while_work_is_dealt_anew_is_let_go() {
+    let (mut job, _) = started(3);
+    job.apply(Event::Lost(0, "connection refused".into()));
+    job.apply(Event::Message(1, 0, ToMaster::Leaving));
+    assert!(job.workers.has_leavers(job.at_work(), Goes::Ends));
+    assert!(!job.workers.has_leavers(&[2], Goes::Ends), "the other one stays");
 }
 
 #[test]
