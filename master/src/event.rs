@@ -146,6 +146,8 @@ pub enum Limit {
     Volume,
     /// Stiffness of a contact.
     Contact,
+    /// Solids will strike a rigid wall.
+    Strike,
     /// A contact node may not travel further.
     Travel,
     /// The step before times the growth.

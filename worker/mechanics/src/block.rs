@@ -259,6 +259,15 @@ impl Block {
         self.group.nodes(element)
     }
 
+    /// Whether its elements have a volume of their own.
+    pub(crate) fn is_of_solids(&self) -> bool {
+        match self.topology {
+            Topology::Structured { .. } | Topology::Explicit { .. } => true,
+            Topology::EightPoint { .. } | Topology::Tetrahedra { .. } => true,
+            Topology::Shells { .. } | Topology::Trusses { .. } | Topology::Beams { .. } => false,
+        }
+    }
+
     /// Local nodes of a side of a local element, see [`Part::side`](crate::mesh::Part::side).
     pub fn side(&self, element: usize, side: usize) -> [u32; 4] {
         let nodes = self.nodes_of(element);

@@ -33,6 +33,8 @@ pub struct NodeSet {
     pub booked: u8,
     /// Those on the contact surface, as far as this copy votes on them.
     pub surface: u8,
+    /// Those that feel walls and are corners of solids which live: the step is to know when they will strike.
+    pub strikes: u8,
 }
 
 impl NodeSet {
@@ -100,6 +102,8 @@ pub struct Booked {
     pub speed_squared: f64,
     /// Greatest speed that a surface node may have when the vote takes effect.
     pub speed_ahead: f64,
+    /// Greatest speed at which a node of solids closes in on a wall that it may strike before the vote takes effect.
+    pub closing: f64,
 }
 
 /// What changes the velocity of every node: `gain - loss v`.
@@ -205,6 +209,7 @@ impl Advance<'_> {
                     held: low_bits::<L>(set.held >> lane),
                     booked: set.booked >> lane,
                     surface: low_bits::<L>(set.surface >> lane),
+                    strikes: low_bits::<L>(set.strikes >> lane),
                 };
                 // SAFETY: the lanes are inside the set; the rest is the caller's promise.
                 unsafe { self.lanes(nodes, moved, body, index * SET + lane, referred + lane, &mut tally) };
@@ -245,6 +250,9 @@ impl Advance<'_> {
             change.y = loss.neg_mul_add(old.y, L::splat(gain[1]));
             change.z = loss.neg_mul_add(old.z, L::splat(gain[2]));
             new = Vector { x: new.x + change.x, y: new.y + change.y, z: new.z + change.z };
+        }
+        if set.strikes != 0 {
+            tally.closing = tally.closing.max(self.closing(nodes, set.strikes, at, &x, &old));
         }
         let set = NodeSet { held: self.not_clear(nodes, set.held, at, &x, &new), ..set };
         if set.held != 0 {

@@ -26,6 +26,9 @@ pub struct Vote {
     pub volume_limit: f64,
     /// Least limit from the stiffness of contacts and from transmitting faces (time).
     pub contact_limit: f64,
+    /// Greatest speed at which solids close in on a rigid wall that they may strike before the vote takes effect, as a share of their
+    /// speed of sound at rest.
+    pub strike: f64,
     /// Greatest squared speed of a contact node after integration.
     pub contact_speed_squared: f64,
     /// Greatest speed that a contact node may have when the vote takes effect.
@@ -141,6 +144,7 @@ impl Vote {
             courant_element: u32::MAX,
             volume_limit: f64::INFINITY,
             contact_limit: f64::INFINITY,
+            strike: 0.0,
             contact_speed_squared: 0.0,
             contact_speed_ahead: 0.0,
             force_bound: 0.0,
@@ -176,6 +180,7 @@ impl Vote {
         }
         self.volume_limit = self.volume_limit.min(other.volume_limit);
         self.contact_limit = self.contact_limit.min(other.contact_limit);
+        self.strike = self.strike.max(other.strike);
         self.contact_speed_squared = self.contact_speed_squared.max(other.contact_speed_squared);
         self.contact_speed_ahead = self.contact_speed_ahead.max(other.contact_speed_ahead);
         self.force_bound = self.force_bound.max(other.force_bound);

@@ -126,7 +126,7 @@ pub fn poses(
         Motion::Driven(velocity) => {
             let moved = velocity.map(|v| v.integral(curves, time));
             let mean = |a: usize| (velocity[a].integral(curves, time + dt) - moved[a]) / dt;
-            [moved, if dt > 0.0 { std::array::from_fn(mean) } else { [0.0; 3] }]
+            [moved, if dt > 0.0 { std::array::from_fn(mean) } else { velocity.map(|v| v.at(curves, time)) }]
         }
         Motion::Free { .. } => free.next().copied().unwrap_or_default(),
     }));
@@ -221,6 +221,55 @@ impl RigidWall {
             Shape::Sphere { centre, radius } => outside(&less(&end(), &each(centre)), radius),
         };
         zero.less_equal(height)
+    }
+
+    /// Whether nodes at `x` may strike the wall within `reach` (time), as fast as they are, for many at once: never false where
+    /// [`RigidWall::closing`] is not zero but for rounding, which is the same on all widths.
+    #[inline(always)]
+    pub(crate) fn within_reach<L: Lane>(
+        &self,
+        pose: &Pose,
+        x: &Vector<L>,
+        v: &Vector<L>,
+        reach: f64,
+    ) -> L::Mask {
+        let each = |[x, y, z]: [f64; 3]| Vector { x: L::splat(x), y: L::splat(y), z: L::splat(z) };
+        let less = |a: &Vector<L>, b: &Vector<L>| Vector { x: a.x - b.x, y: a.y - b.y, z: a.z - b.z };
+        let sum = |a: &Vector<L>, b: &Vector<L>| a.x * b.x + a.y * b.y + a.z * b.z;
+        let (zero, reach) = (L::splat(0.0), L::splat(reach));
+        let [moved, speed] = *pose;
+        let (x, v) = (less(x, &each(moved)), less(v, &each(speed)));
+        let round = |from: &Vector<L>, radius: f64| {
+            let distance = sum(from, from).sqrt();
+            (distance - L::splat(radius)) * distance + sum(&v, from) * reach
+        };
+        let height = match self.shape {
+            Shape::Plane { point, normal } => {
+                let normal = each(normal);
+                sum(&less(&x, &each(point)), &normal) + sum(&v, &normal) * reach
+            }
+            Shape::Cylinder { point, axis, radius } => {
+                let (from, axis) = (less(&x, &each(point)), each(axis));
+                let along = sum(&from, &axis);
+                let across = Vector {
+                    x: along.neg_mul_add(axis.x, from.x),
+                    y: along.neg_mul_add(axis.y, from.y),
+                    z: along.neg_mul_add(axis.z, from.z),
+                };
+                round(&across, radius)
+            }
+            Shape::Sphere { centre, radius } => round(&less(&x, &each(centre)), radius),
+        };
+        height.less(zero)
+    }
+
+    /// The speed at which a node closes in on the wall, if it strikes within `reach` (time) as fast as it is; else zero. What the
+    /// wall stops at once, elements behind it feel as a jump.
+    pub fn closing(&self, [moved, speed]: &Pose, x: [f64; 3], v: [f64; 3], reach: f64) -> f64 {
+        let (height, normal) = self.shape.height(std::array::from_fn(|a| x[a] - moved[a]));
+        let closing = -(0..3).map(|a| (v[a] - speed[a]) * normal[a]).sum::<f64>();
+        // Material is outside of shapes that bulge outwards: nothing strikes earlier than on the straight way to the nearest point.
+        if closing > 0.0 && height < closing * reach { closing } else { 0.0 }
     }
 
     /// Keeps a node that would end inside the wall on its surface; friction takes `mu` times the normal impulse. True

@@ -57,7 +57,7 @@ impl HeldBlock {
             Eroding::new(criteria, erosion.as_ref(), &mut block, material, setup.control.safety_factor)
         });
         let part = block.part;
-        Self {
+        let mut held_block = Self {
             is_rigid: setup.bodies.iter().any(|body| body.parts.binary_search(&part).is_ok()),
             sets: NodeSet::all(&block.constraint),
             faces: face::faces_of(&block, &setup.loads, material),
@@ -75,7 +75,9 @@ impl HeldBlock {
             contact_history,
             shared: Share::default(),
             led: Vec::new(),
-        }
+        };
+        held_block.mark_strikes(setup);
+        held_block
     }
 }
 

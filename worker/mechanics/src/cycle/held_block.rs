@@ -111,6 +111,22 @@ impl HeldBlock {
         }
     }
 
+    /// Finds the nodes whose strike on a wall would be felt by a solid: corners of its elements that live.
+    pub fn mark_strikes(&mut self, setup: &Setup) {
+        self.sets.iter_mut().for_each(|set| set.strikes = 0);
+        if setup.walls.is_empty() || self.is_rigid || !self.block.is_of_solids() {
+            return;
+        }
+        for element in (0..self.block.n_elements()).filter(|&element| self.block.is_alive(element)) {
+            for &node in self.block.nodes_of(element).iter() {
+                let node = node as usize;
+                if setup.constraints[usize::from(self.block.constraint[node])].walls != 0 {
+                    self.sets[node / SET].strikes |= 1 << (node % SET);
+                }
+            }
+        }
+    }
+
     /// Integrates its nodes and books what they say; elements that have eroded leave.
     pub fn integrate(&mut self, advance: &Advance<'_>, setup: &Setup, width: Width) {
         let block = &mut self.block;
@@ -141,6 +157,7 @@ impl HeldBlock {
         if self.eroding.as_mut().is_some_and(Eroding::take_change) {
             // Loads leave with the faces of eroded elements.
             self.leave_out_dead();
+            self.mark_strikes(setup);
             if !self.faces.is_empty() {
                 let material = &setup.materials[self.block.material as usize];
                 self.faces = face::faces_of(&self.block, &setup.loads, material);

@@ -2,8 +2,13 @@
 
 use std::ops::Range;
 
-use super::{Domain, Load, Meter, Sets};
-use crate::{lanes::SET, vote::Vote, wall::WallVote};
+use super::{Domain, Load, Meter, Sets, held_block::HeldBlock};
+use crate::{
+    lanes::SET,
+    setup::Setup,
+    vote::Vote,
+    wall::{self, WallVote},
+};
 
 impl Domain {
     /// Number of elements held.
@@ -40,8 +45,26 @@ impl Domain {
             self.vote.contact_speed_squared = self.vote.contact_speed_squared.max(top);
             self.vote.contact_speed_ahead = self.vote.contact_speed_ahead.max(top.sqrt());
         }
+        self.foresee_strikes();
         self.gauges_before = self.read_gauges();
         self.finish_vote(0.0)
+    }
+
+    /// Before the first step nobody knows how long steps are: whatever closes in on a wall counts, however far it is.
+    fn foresee_strikes(&mut self) {
+        let Setup { walls, loads, constraints, .. } = &self.setup;
+        let free = wall::first_poses(walls);
+        wall::poses(walls, &loads.curves, self.time, 0.0, &free, &mut self.poses);
+        for HeldBlock { block, sets, booked, .. } in &mut self.held_blocks {
+            for i in (0..block.nodes.len()).filter(|i| sets[i / SET].strikes >> (i % SET) & 1 == 1) {
+                let felt = constraints[usize::from(block.constraint[i])].walls;
+                let (x, v) = (block.x.each_ref().map(|x| x[i]), block.v.each_ref().map(|v| v[i]));
+                for w in (0..walls.len()).filter(|w| felt >> w & 1 == 1) {
+                    let closing = walls[w].closing(&self.poses[w], x, v, f64::INFINITY);
+                    booked.closing = booked.closing.max(closing);
+                }
+            }
+        }
     }
 
     /// Positions and velocities of the gauge nodes as they are.
@@ -76,6 +99,10 @@ impl Domain {
             vote.extents[part].merge(&held_block.booked.extent);
             vote.contact_speed_squared = vote.contact_speed_squared.max(held_block.booked.speed_squared);
             vote.contact_speed_ahead = vote.contact_speed_ahead.max(held_block.booked.speed_ahead);
+            if held_block.booked.closing > 0.0 {
+                let sound = self.setup.materials[held_block.block.material as usize].sound_speed();
+                vote.strike = vote.strike.max(held_block.booked.closing / sound);
+            }
             if let Some(eroding) = &mut held_block.eroding {
                 let eroded_now = eroding.take_casualties();
                 vote.add_eroded(&eroded_now.elements);

@@ -8,7 +8,47 @@ use crate::{
     work::Work,
 };
 
+/// Steps within which a strike is foreseen. A vote takes effect two steps after its own, and each may be twice as long as the one before.
+const FORESEEN: f64 = 3.0;
+
 impl Advance<'_> {
+    /// The greatest speed at which one of these nodes from `at` on closes in on a wall that it may strike in this step or the next one. `v`
+    /// are the velocities before the step: a node that rests on a wall has none against it, however hard it is pressed.
+    #[inline(always)]
+    pub(super) fn closing<L: Lane>(
+        &self,
+        nodes: &Nodes<'_>,
+        strikes: u8,
+        at: usize,
+        x: &Vector<L>,
+        v: &Vector<L>,
+    ) -> f64 {
+        let reach = FORESEEN * self.dt;
+        let walls_of = |lane: u32| self.constraints[usize::from(nodes.constraint[at + lane as usize])].walls;
+        let (mut left, mut walls) = (strikes, 0);
+        while left != 0 {
+            walls |= walls_of(left.trailing_zeros());
+            left &= left - 1;
+        }
+        let mut greatest = 0.0_f64;
+        while walls != 0 {
+            let w = walls.trailing_zeros() as usize;
+            walls &= walls - 1;
+            let mut near = strikes & L::bits(self.walls[w].within_reach(&self.poses[w], x, v, reach)) as u8;
+            while near != 0 {
+                let lane = near.trailing_zeros();
+                near &= near - 1;
+                if walls_of(lane) >> w & 1 == 1 {
+                    let i = at + lane as usize;
+                    let of = |along: &[Vec<f64>; 3]| std::array::from_fn(|a| along[a][i]);
+                    let closing = self.walls[w].closing(&self.poses[w], of(nodes.x), of(nodes.v), reach);
+                    greatest = greatest.max(closing);
+                }
+            }
+        }
+        greatest
+    }
+
     /// Those of the held nodes from `at` on that [`Advance::hold`] must see: not those that feel only walls and are clear
     /// of them in this step, which most are. `v` are the free velocities.
     #[inline(always)]

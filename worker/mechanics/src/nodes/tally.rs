@@ -14,6 +14,7 @@ pub(super) struct Tally<L> {
     /// Work of gravity and relaxation, before `t_n` and after it.
     pub body_work: [L; 2],
     pub external: Work,
+    pub closing: f64,
 }
 
 impl<L: Lane> Tally<L> {
@@ -29,12 +30,13 @@ impl<L: Lane> Tally<L> {
             speed_ahead: zero,
             body_work: [zero; 2],
             external: Work::default(),
+            closing: 0.0,
         }
     }
 
     #[inline(always)]
     pub fn join(&self) -> Booked {
-        let mut booked = Booked { external: self.external, ..Booked::default() };
+        let mut booked = Booked { external: self.external, closing: self.closing, ..Booked::default() };
         let (kinetic, momentum) = (self.kinetic.to_array(), arrays(&self.momentum));
         let (low, high) = (arrays(&self.low), arrays(&self.high));
         let (squared, ahead) = (self.speed_squared.to_array(), self.speed_ahead.to_array());

@@ -47,7 +47,7 @@ fn loaded_one(
         f: &mut force,
         mass: &[2.0; SET],
         constraint: &[1],
-        sets: &[NodeSet { held: 1, booked: 1, surface: 0 }],
+        sets: &[NodeSet { held: 1, booked: 1, surface: 0, strikes: 1 }],
         reference: &Default::default(),
         walls: &mut votes,
     };
@@ -99,6 +99,24 @@ fn what_a_node_loses_the_wall_gets_and_a_light_wall_counts_the_mass_on_it() {
 }
 
 #[test]
+fn a_strike_within_three_steps_is_foreseen_with_the_speed_of_the_node_against_the_wall() {
+    let touches = Constraint { walls: 1, ..Constraint::default() };
+    let fixed = RigidWall { shape: FLOOR, motion: Motion::Fixed, friction: 0.0, parts: vec![true] };
+    let closing = |v: [f64; 3], f: [f64; 3]| {
+        loaded_one(v, f, touches, std::slice::from_ref(&fixed), &Loads::default()).2.closing
+    };
+    // The node is a thousandth above the wall, and a step is a thousandth long.
+    assert_eq!(closing([9.0, 0.0, -10.0], [0.0; 3]), 10.0, "it strikes now");
+    assert_eq!(closing([9.0, 0.0, -0.4], [0.0; 3]), 0.4, "it strikes within three steps");
+    assert_eq!(closing([9.0, 0.0, -0.3], [0.0; 3]), 0.0, "it is too far away");
+    assert_eq!(closing([9.0, 0.0, 10.0], [0.0; 3]), 0.0, "it leaves");
+    assert_eq!(closing([0.0; 3], [0.0, 0.0, -1e5]), 0.0, "it is pressed, not fast");
+    let free = Constraint::default();
+    let (_, _, booked, _) = loaded_one([0.0, 0.0, -10.0], [0.0; 3], free, &[fixed], &Loads::default());
+    assert_eq!(booked.closing, 0.0, "it does not feel the wall");
+}
+
+#[test]
 fn gravity_relaxation_and_nodal_force_change_the_velocity_and_book_their_work() {
     let curves = vec![Curve { points: vec![[0.0, 0.0], [1.0, 2.0]] }];
     let drive = Drive::along(0, 3.0);
@@ -146,6 +164,7 @@ fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
     let mut sets = NodeSet::all(&constraint);
     for (i, set) in (0..n).map(|i| (i, i / SET)).filter(|(i, _)| i % 3 != 1) {
         sets[set].booked |= 1 << (i % SET);
+        sets[set].strikes |= sets[set].held & 1 << (i % SET);
         if !(8..=17).contains(&i) {
             sets[set].surface |= 1 << (i % SET);
         }
@@ -193,7 +212,7 @@ fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
         let booked = advance.run(&mut nodes, width);
         assert!(booked.external != Work::default() && booked.speed_ahead > booked.speed_squared.sqrt());
         let bits: Vec<u64> = x.iter().chain(&v).flatten().map(|c| c.to_bits()).collect();
-        assert!(votes[0].touched > 0.0);
+        assert!(votes[0].touched > 0.0 && booked.closing > 0.0);
         (booked, votes, bits)
     };
     let reference = run(Width::Scalar);
