@@ -34,7 +34,7 @@ mod workers;
 use std::sync::Arc;
 
 use deck::model::Model;
-use mechanics::{contact::Surface, digest, state::GlobalState, vote::Vote};
+use mechanics::{contact::Surface, digest, rigid::switch, state::GlobalState, vote::Vote};
 use protocol::{
     message::{Orders, ToMaster, ToWorker, WORKER_STATE_VERSION},
     options::{Balance, Route},
@@ -384,7 +384,8 @@ impl Job {
                 && match self.twice.until() {
                     Some(until) => after >= until,
                     None => {
-                        self.wants_next_epoch(after)
+                        self.switches_at(time_after)
+                            || self.wants_next_epoch(after)
                             || (self.twice.is_chosen() && self.checkpoint_due(after, actions))
                     }
                 };
@@ -432,6 +433,12 @@ impl Job {
                     && (self.workers.has_newcomers(at_work)
                         || self.workers.has_leavers(at_work, Goes::Needed)
                         || self.wants_other_speeds(cycle))))
+    }
+
+    /// Whether parts are to become rigid, or to deform again, before the cycle that begins at a time.
+    fn switches_at(&self, time: f64) -> bool {
+        let formed = &self.checkpoints.newest().continuation.formed;
+        switch::is_due(&self.model().setup.switches, formed, time)
     }
 
     /// Whether the epoch is to end for other speeds.

@@ -4,7 +4,7 @@ use deck::model::Model;
 use mechanics::{
     contact::PairEnergies,
     mesh::Part,
-    rigid,
+    rigid::{self, switch::Loss},
     state::{GlobalState, field},
     vote::{PartVote, Vote},
     wall::WallVote,
@@ -268,6 +268,14 @@ impl RunTotals {
             holders: self.holders.iter().map(|(row, _)| *row).collect(),
             joints: vote.joints.iter().map(|joint| [joint.force, joint.moment]).collect(),
         };
+    }
+
+    /// Books what a part lost as it became rigid, after the cycle booked last: work from outside that takes it.
+    pub fn book_formed(&mut self, loss: &Loss) {
+        self.external_ahead -= loss.kinetic;
+        if let Some(ahead) = self.external_ahead_of_parts.get_mut(loss.part as usize) {
+            *ahead -= loss.kinetic;
+        }
     }
 
     /// Books what walls and supports gave the bodies by impulses over `half_steps`; gives what was lost at walls.

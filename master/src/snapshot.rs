@@ -9,7 +9,7 @@ pub mod store;
 
 use std::sync::Arc;
 
-use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
+use mechanics::{exact::Quantum, rigid::switch::Formed, state::GlobalState, vote::Vote, wall::Pose};
 use serde::{Deserialize, Serialize};
 
 pub use file::{read, write};
@@ -35,6 +35,8 @@ pub struct Snapshot {
     pub vote: Vote,
     /// Poses of the walls of finite mass in the cycle to come.
     pub walls: Vec<Pose>,
+    /// Parts that are rigid for a time, and are now.
+    pub formed: Vec<Formed>,
     /// Energies and worst ratios so far.
     pub run_totals: RunTotals,
     pub rows: Vec<Arc<HistoryRow>>,

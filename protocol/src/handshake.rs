@@ -26,6 +26,7 @@ use std::fmt;
 /// and votes, and the cycles between two rows of the history; tetrahedra in assignments, the ten nodes of their faces in plans;
 /// beams in assignments.
 /// 11: the most workers that a job takes, and the seconds to its end; plies of shells in assignments.
+/// 13: workers that divide their threads.
 /// 14: votes foresee strikes on rigid walls, setups have parts that are rigid for a time.
 pub const VERSION: u16 = 14;
 

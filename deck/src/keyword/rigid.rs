@@ -8,7 +8,7 @@ use super::{
     fields::{Context, Fields, TENS},
     inertia::Inertia,
 };
-use crate::place::Place;
+use crate::{place::Place, table::Range};
 
 /// Parts by number, or by the number of their set.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +25,14 @@ pub(super) struct Joined {
     pub(super) lead: u32,
     /// Whether their materials are those of bodies that deform.
     pub(super) switched: bool,
+}
+
+/// Parts that become rigid at a time, and parts that deform from then on.
+pub(super) struct SwitchCard {
+    pub(super) time: f64,
+    /// Each with the part whose body it joins; 0 is none.
+    pub(super) to_rigid: Vec<(Place, Members, u32)>,
+    pub(super) to_deformable: Vec<(Place, Members)>,
 }
 
 /// A motion of a body by curve.
@@ -74,6 +82,7 @@ pub(super) struct BodyStart {
 #[derive(Default)]
 pub(super) struct RigidCards {
     pub(super) joined: Vec<Joined>,
+    pub(super) switches: Vec<SwitchCard>,
     pub(super) motions: Vec<BodyMotion>,
     pub(super) starts: Vec<BodyStart>,
     pub(super) of_nodes: Vec<NodalBody>,
@@ -113,12 +122,7 @@ impl RigidCards {
     ) {
         let named = block.take("_ID");
         match block.keyword.as_str() {
-            "DEFORMABLE_TO_RIGID_AUTOMATIC" => context.log.fault(
-                block.at,
-                "*DEFORMABLE_TO_RIGID_AUTOMATIC",
-                "parts that are rigid all along or never",
-                "take it out, or make them rigid from the start by *DEFORMABLE_TO_RIGID",
-            ),
+            "DEFORMABLE_TO_RIGID_AUTOMATIC" => self.switches.extend(switch(block, context)),
             "DEFORMABLE_TO_RIGID_INERTIA" => context.log.fault(
                 block.at,
                 "*DEFORMABLE_TO_RIGID_INERTIA",
@@ -166,11 +170,7 @@ impl RigidCards {
         let at = f.at;
         match word {
             "DEFORMABLE_TO_RIGID" => {
-                let members = match f.words(2).to_ascii_uppercase().as_str() {
-                    "" | "PART" => Members::Part(f.id(0)),
-                    "PSET" => Members::Set(f.id(0)),
-                    _ => return f.fault(2, "PTYPE PART or PSET", "name a part or a set of parts"),
-                };
+                let Some(members) = members_of(f, 2) else { return };
                 self.joined.push(Joined { at, members, lead: f.id(1), switched: true });
             }
             "CONSTRAINED_RIGID_BODIES" | "CONSTRAINED_RIGID_BODIES_SET" => {
@@ -214,6 +214,69 @@ impl RigidCards {
             }
         }
     }
+}
+
+/// Parts by number, or a set of them where field `kind` says so.
+fn members_of(f: &Fields<'_>, kind: usize) -> Option<Members> {
+    match f.words(kind).to_ascii_uppercase().as_str() {
+        "" | "PART" => Some(Members::Part(f.id(0))),
+        "PSET" => Some(Members::Set(f.id(0))),
+        _ => {
+            f.fault(kind, "PTYPE PART or PSET", "name a part or a set of parts");
+            None
+        }
+    }
+}
+
+/// A set of automatic switches.
+fn switch(block: &Block<'_>, context: &Context<'_>) -> Option<SwitchCard> {
+    let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
+    let (Some(first), Some(second)) = (cards.next(), cards.next()) else {
+        context.log.fault(
+            block.at,
+            "*DEFORMABLE_TO_RIGID_AUTOMATIC with less than two cards",
+            "when parts switch, and how many",
+            "complete it",
+        );
+        return None;
+    };
+    let f = context.fields(first, block.width, &TENS);
+    if f.integer(1) != 0 {
+        f.fault(1, "CODE 0: a switch at TIME1", "give CODE 0 and the time");
+    }
+    for i in [6, 7].into_iter().filter(|i| f.integer(*i) != 0) {
+        f.fault(i, "no related switch set", "leave RELSW and PAIRED blank, and give each switch its time");
+    }
+    let time = f.within(2, 0.0, Range::NotNegative);
+    let g = context.fields(second, block.width, &TENS);
+    for i in (0..3).filter(|i| g.integer(*i) != 0) {
+        g.fault(i, "0: nodal rigid bodies, constraints and walls stay", "leave NRBF, NCSF and RWF blank");
+    }
+    if g.real(3, 0.0) != 0.0 {
+        context
+            .log
+            .warn(g.place(3), "DTMAX is not used: elements limit the time step after a switch as before");
+    }
+    let counts = [4, 5].map(|i| usize::try_from(g.integer(i)).unwrap_or_default());
+    let cards: Vec<_> = cards.collect();
+    if cards.len() != counts[0] + counts[1] {
+        g.fault(
+            4,
+            format!("the number of cards behind this one, {}, as the sum of D2R and R2D", cards.len()),
+            "correct D2R, R2D or the cards",
+        );
+        return None;
+    }
+    let (rigid, deformable) = cards.split_at(counts[0]);
+    let to_rigid = rigid.iter().filter_map(|card| {
+        let f = context.fields(card, block.width, &TENS);
+        Some((f.at, members_of(&f, 2)?, f.id(1)))
+    });
+    let to_deformable = deformable.iter().filter_map(|card| {
+        let f = context.fields(card, block.width, &TENS);
+        Some((f.at, members_of(&f, 1)?))
+    });
+    Some(SwitchCard { time, to_rigid: to_rigid.collect(), to_deformable: to_deformable.collect() })
 }
 
 /// Axes that a code from 0 to 7 holds.

@@ -14,6 +14,7 @@ mod output;
 mod part;
 mod rigid;
 mod state;
+mod switch;
 
 use super::problem::Problem;
 use crate::{
@@ -38,6 +39,7 @@ pub(super) fn translate(
     material::write(&mut t);
     part::write(&mut t);
     rigid::write(&mut t);
+    switch::write(&mut t);
     joint::write(&mut t);
     condition::write_held(&mut t);
     condition::write_motions(&mut t);

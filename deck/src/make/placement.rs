@@ -126,6 +126,6 @@ fn default_gap(
     let joins = assembly::joins(&deck.joins, &names, &quiet);
     let assembly = assembly::assemble(parts, &joins, materials, meshes, &quiet)?;
     let curves = Curves::of(&deck.curves, &quiet);
-    let rigid = rigid::drafts(&deck.rigid, &names, &curves, &assembly, &quiet);
+    let (rigid, _) = rigid::drafts(&deck.rigid, &names, &curves, &assembly, &quiet);
     contact::gap_to_come(given, &names, &assembly, &rigid, &quiet)
 }

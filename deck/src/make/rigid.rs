@@ -2,7 +2,7 @@
 
 use mechanics::{
     constraint::Constraint,
-    load::Drive,
+    load::{Drive, Span},
     material::Material,
     rigid::{Body, shape},
 };
@@ -16,7 +16,10 @@ use super::{
 use crate::{log::Log, typed::condition::Rigid};
 use held::Held;
 
+mod for_a_time;
 mod held;
+
+pub(super) use for_a_time::make_for_a_time;
 
 /// A rigid body and what it is given.
 pub(super) struct RigidDraft<'d> {
@@ -35,20 +38,25 @@ impl<'d> RigidDraft<'d> {
         &self.given.parts
     }
 
+    /// Whether some part is of both.
+    fn shares_parts_with(&self, other: &Self) -> bool {
+        self.given.parts.iter().any(|part| other.given.parts.contains(part))
+    }
+
     /// Whether it has this name, or this part.
     pub(super) fn is(&self, name: &str, part: Option<usize>) -> bool {
         self.name() == Some(name) || part.is_some_and(|part| self.given.parts.contains(&(part as u32)))
     }
 }
 
-/// Resolves what the bodies are given; a part of two bodies is a fault.
+/// Resolves what the bodies are given, those that last and those that are rigid for a time; a part of two bodies at one time is a fault.
 pub(super) fn drafts<'d>(
     list: &'d [Rigid],
     names: &Names<'_>,
     curves: &Curves<'_>,
     assembly: &Assembly,
     log: &Log<'_>,
-) -> Vec<RigidDraft<'d>> {
+) -> (Vec<RigidDraft<'d>>, Vec<RigidDraft<'d>>) {
     let mut drafts: Vec<RigidDraft<'d>> = Vec::new();
     for rigid in list {
         let parts: Vec<u32> =
@@ -64,7 +72,10 @@ pub(super) fn drafts<'d>(
                 log.fault_of(name.origin, "a name that no part outside this body has", "choose another name");
             }
         }
-        let of_both = |other: &&RigidDraft<'d>| parts.iter().any(|p| other.given.parts.contains(p));
+        let of_both = |other: &&RigidDraft<'d>| {
+            let at_once = !rigid.span.is_apart_from(&other.rigid.span);
+            at_once && parts.iter().any(|p| other.given.parts.contains(p))
+        };
         for other in drafts.iter().filter(of_both) {
             let line = log.line(other.rigid.at, rigid.at);
             let a_body = log.say("the [[rigid]]", "the rigid body");
@@ -91,7 +102,7 @@ pub(super) fn drafts<'d>(
         };
         drafts.push(RigidDraft { rigid, given });
     }
-    drafts
+    drafts.into_iter().partition(|draft| draft.rigid.span == Span::ALWAYS)
 }
 
 /// The parts of each body.
@@ -167,7 +178,7 @@ pub(super) fn make(
         };
         let mut made = make(given.clone());
         if let (Some(id), Ok(body)) = (first_held, &made) {
-            let Some(held) = given_with_supports(given, body, conditions) else {
+            let Some(held) = given_with_supports(&given, body, conditions, &Constraint::clone) else {
                 log.fault(
                     at,
                     format!("{title} with node {id}, which a boundary or a wall holds"),
@@ -228,11 +239,17 @@ fn is_free(by: &Constraint) -> bool {
 }
 
 /// What a body is given, and what supports of its nodes hold of it; none where they do more than hold, or another motion is given there.
-fn given_with_supports(given: &shape::Given, body: &Body, conditions: &Conditions) -> Option<shape::Given> {
+/// `acting` is what of a constraint acts on nodes of the body.
+fn given_with_supports(
+    given: &shape::Given,
+    body: &Body,
+    conditions: &Conditions,
+    acting: &dyn Fn(&Constraint) -> Constraint,
+) -> Option<shape::Given> {
     let reach = body.places.iter().flatten().fold(f64::MIN_POSITIVE, |reach, c| reach.max(c.abs()));
     let mut held = Held::default();
     for (&n, place) in body.nodes.iter().zip(&body.places) {
-        let by = &conditions.constraints[conditions.constraint[n as usize] as usize];
+        let by = &acting(&conditions.constraints[conditions.constraint[n as usize] as usize]);
         if !is_free(by) && !held.take(by, place.map(|c| c / reach)) {
             return None;
         }

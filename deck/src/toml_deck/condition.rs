@@ -242,6 +242,7 @@ pub(super) fn read_rigid(deck: &Table<'_>) -> Vec<Rigid> {
             table.finish();
             circle
         });
+        let span = span(&table);
         table.finish();
         Rigid {
             at,
@@ -255,6 +256,7 @@ pub(super) fn read_rigid(deck: &Table<'_>) -> Vec<Rigid> {
             velocity: velocity.unwrap_or(NO_COMPONENTS),
             spin: spin.unwrap_or(NO_COMPONENTS),
             circle,
+            span,
         }
     };
     deck.tables("rigid", MAX_ENTRIES).into_iter().map(rigid).collect()

@@ -171,6 +171,8 @@ pub(crate) struct Rigid {
     pub(crate) velocity: Components,
     pub(crate) spin: Components,
     pub(crate) circle: Option<Circle>,
+    /// When it is one; at other times its parts deform.
+    pub(crate) span: Span,
 }
 
 /// A joint of two rigid bodies, or of one and space.

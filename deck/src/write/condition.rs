@@ -73,6 +73,7 @@ fn write_rigid(text: &mut Text, rigid: &Rigid) {
     if let Some(given) = &rigid.circle {
         text.key("rotation", table(&circle(given)));
     }
+    span(&rigid.span).for_each(|(key, value)| text.key(key, value));
 }
 
 fn write_joint(text: &mut Text, joint: &Joint) {

@@ -6,7 +6,16 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use mechanics::{exact::Quantum, state::GlobalState, vote::Vote, wall::Pose};
+use mechanics::{
+    exact::Quantum,
+    rigid::{
+        State,
+        switch::{self, Formed},
+    },
+    state::GlobalState,
+    vote::Vote,
+    wall::Pose,
+};
 
 use super::{error::Error, problem::Problem};
 use crate::{
@@ -33,6 +42,8 @@ pub(super) struct Continuation {
     pub(super) vote: Option<Vote>,
     /// Poses of the walls of finite mass in the cycle to come.
     pub(super) walls: Vec<Pose>,
+    /// Parts that are rigid for a time, and are now.
+    pub(super) formed: Vec<Formed>,
     /// With the cycle before in it.
     pub(super) run_totals: RunTotals,
     /// Rows of history up to there.
@@ -43,19 +54,39 @@ pub(super) struct Continuation {
 
 impl Checkpoint {
     /// Of the start of a run.
-    pub(super) fn first(problem: &Problem, start: GlobalState) -> Self {
+    ///
+    /// # Errors
+    /// If a part that is rigid at first cannot be.
+    pub(super) fn first(problem: &Problem, mut start: GlobalState) -> Result<Self, Error> {
         let model = &problem.model;
+        let (mut formed, mut bodies) = (Vec::new(), Vec::new());
+        bodies.extend(model.setup.bodies.iter().map(|body| body.start));
+        let walls = mechanics::wall::first_poses(&model.setup.walls);
+        let at = (&mut start, walls.as_slice());
+        switch::switch(&model.setup, &model.mesh, at, &mut formed, &mut bodies).map_err(Error::Problem)?;
         let continuation = Continuation {
             dt_previous: 0.0,
             dt: None,
             quanta: [problem.quanta.force; 2],
             vote: None,
-            walls: mechanics::wall::first_poses(&model.setup.walls),
+            walls,
+            formed,
             run_totals: RunTotals::at_start(model, &start),
             n_rows: 0,
             spread_rate: 0.0,
         };
-        Self { state: Arc::new(start), continuation }
+        Ok(Self { state: Arc::new(start), continuation })
+    }
+
+    /// States of the rigid bodies, those that last first.
+    pub(super) fn bodies(&self, problem: &Problem) -> Vec<State> {
+        match &self.continuation.vote {
+            Some(vote) => vote.bodies.clone(),
+            None => {
+                let formed = self.continuation.formed.iter().map(|formed| &formed.body);
+                problem.model.setup.bodies.iter().chain(formed).map(|body| body.start).collect()
+            }
+        }
     }
 
     /// From disk, with the rows of history up to there. `start` is the state that the deck gives.
@@ -72,7 +103,8 @@ impl Checkpoint {
             || shape(&snapshot.state) != shape(start)
             || snapshot.state.initial_volume != start.initial_volume
             || snapshot.walls.len() != mechanics::wall::first_poses(&setup.walls).len()
-            || snapshot.vote.bodies.len() != setup.bodies.len()
+            || snapshot.vote.bodies.len() != setup.bodies.len() + snapshot.formed.len()
+            || !snapshot.formed.iter().all(|formed| fits(formed, problem))
             || snapshot.vote.joints.len() != setup.joints.len()
         {
             return Err(Error::AnotherProblem);
@@ -83,6 +115,7 @@ impl Checkpoint {
             quanta: snapshot.force_quanta,
             vote: Some(snapshot.vote),
             walls: snapshot.walls,
+            formed: snapshot.formed,
             run_totals: snapshot.run_totals,
             n_rows: snapshot.rows.len(),
             spread_rate: snapshot.spread_rate,
@@ -107,12 +140,24 @@ impl Checkpoint {
             spread_rate: continuation.spread_rate,
             vote: continuation.vote.clone()?,
             walls: continuation.walls.clone(),
+            formed: continuation.formed.clone(),
             run_totals: continuation.run_totals.clone(),
             rows: rows[..continuation.n_rows].to_vec(),
             states: Vec::new(),
             sums: Vec::new(),
         }))
     }
+}
+
+/// Whether a body that has formed is one of the problem, of nodes that it has.
+fn fits(formed: &Formed, problem: &Problem) -> bool {
+    let Formed { switch, body, constraint } = formed;
+    let n = body.nodes.len();
+    let setup = &problem.model.setup;
+    (*switch as usize) < setup.switches.len()
+        && (body.places.len(), constraint.len()) == (n, n)
+        && body.nodes.iter().all(|&node| (node as usize) < problem.model.mesh.n_nodes())
+        && constraint.iter().all(|&constraint| usize::from(constraint) < setup.constraints.len())
 }
 
 /// How long the arrays of a state are: what its mesh and its laws ask for.
@@ -260,7 +305,7 @@ mod tests {
     fn checkpoint() -> Checkpoint {
         let model = deck::read(super::super::tests::DECK, "two cubes").expect("a good deck");
         let (problem, start) = Problem::new(Arc::new(model)).expect("a good problem");
-        Checkpoint::first(&problem, start)
+        Checkpoint::first(&problem, start).expect("nothing becomes rigid")
     }
 
     #[test]

@@ -151,6 +151,7 @@ impl Job {
             quanta: [step.quantum, schedule.quantum()],
             vote: Some(vote),
             walls: self.account.walls.clone(),
+            formed: self.checkpoints.newest().continuation.formed.clone(),
             run_totals: self.account.run_totals.clone(),
             n_rows: self.account.rows.len(),
             spread_rate: self.epoch.sorts.spread_rate(),

@@ -8,6 +8,7 @@ use mechanics::{
     exact::Quanta,
     mesh::Mesh,
     piece::{self, Piece, Region},
+    rigid::switch,
     state::GlobalState,
     vote::Watched,
 };
@@ -55,7 +56,7 @@ impl Job {
         }
         let (problem, start) = Problem::new(model)?;
         let (first, rows) = match resume {
-            None => (Checkpoint::first(&problem, start), Vec::new()),
+            None => (Checkpoint::first(&problem, start)?, Vec::new()),
             Some(snapshot) => Checkpoint::restored(snapshot, &problem, &start)?,
         };
         let keep = options.keep;
@@ -137,7 +138,9 @@ impl Job {
         }
         let threads: Vec<u32> = specs.iter().map(|spec| spec.threads).collect();
         let held = work(&layout, n, costs.node, &Living::new(&model.mesh, alive.as_deref()));
-        let division = Division::new(model, state, (&layout, held), &threads, problem.touching.as_ref());
+        let n_bodies = model.setup.bodies.len() + checkpoint.continuation.formed.len();
+        let dealt = (layout.as_slice(), held);
+        let division = Division::new((model, n_bodies), state, dealt, &threads, problem.touching.as_ref());
         let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
         let dropped =
             epoch.sorts.eroded().map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
@@ -177,10 +180,8 @@ impl Job {
         };
         self.tally.imbalance = imbalance(&elements, &interactions, &speeds);
         let exchange = Arc::new(exchange);
-        let bodies = match &checkpoint.continuation.vote {
-            Some(vote) => vote.bodies.clone(),
-            None => model.setup.bodies.iter().map(|body| body.start).collect(),
-        };
+        let bodies = checkpoint.bodies(problem);
+        let setup = switch::with_formed(&model.setup, &checkpoint.continuation.formed);
         let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
         let watched = Watched {
             elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
@@ -191,7 +192,7 @@ impl Job {
         for (position, subdomains) in division.by_worker.into_iter().enumerate() {
             let assign = Assign {
                 epoch: number,
-                setup: model.setup.clone(),
+                setup: setup.clone(),
                 n_parts: model.mesh.parts.len() as u32,
                 quanta: Quanta { force: checkpoint.continuation.quanta[0], ..problem.quanta },
                 subdomains,
@@ -239,7 +240,7 @@ struct Division {
 
 impl Division {
     fn new(
-        model: &Model,
+        (model, n_bodies): (&Model, usize),
         state: &GlobalState,
         (layout, work): (&[decompose::Subdomain], Vec<f64>),
         threads: &[u32],
@@ -260,8 +261,8 @@ impl Division {
             nodes_of.push(nodes);
             subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
         }
-        let node_owners = NodeOwners::new(model.mesh.n_nodes(), work, layout, &nodes_of)
-            .with_bodies(model.setup.bodies.len());
+        let node_owners =
+            NodeOwners::new(model.mesh.n_nodes(), work, layout, &nodes_of).with_bodies(n_bodies);
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
         for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {

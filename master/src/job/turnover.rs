@@ -2,10 +2,16 @@
 
 use std::sync::Arc;
 
-use mechanics::{state::GlobalState, vote::Vote};
+use mechanics::{rigid::switch, state::GlobalState, vote::Vote};
 use protocol::message::ToWorker;
 
-use super::{Job, checkpoints::Checkpoint, error::Error, samples::Stopped, workers::Goes};
+use super::{
+    Job,
+    checkpoints::{Checkpoint, Continuation},
+    error::Error,
+    samples::Stopped,
+    workers::Goes,
+};
 use crate::{
     event::{Action, WorkerSpec},
     incident::Loss,
@@ -219,9 +225,15 @@ impl Job {
         Ok(())
     }
 
-    /// Where all have stopped is the newest checkpoint.
-    fn adopt(&mut self, state: GlobalState, vote: Vote) -> Result<(), Error> {
-        let continuation = self.rest_at(state.cycle, vote)?;
+    /// Where all have stopped is the newest checkpoint. Parts that are rigid for a time become so here, and end.
+    fn adopt(&mut self, mut state: GlobalState, mut vote: Vote) -> Result<(), Error> {
+        let model = &self.problem.model;
+        let mut formed = self.checkpoints.newest().continuation.formed.clone();
+        let at = (&mut state, self.account.walls.as_slice());
+        let losses = switch::switch(&model.setup, &model.mesh, at, &mut formed, &mut vote.bodies)
+            .map_err(Error::Problem)?;
+        losses.iter().for_each(|loss| self.account.run_totals.book_formed(loss));
+        let continuation = Continuation { formed, ..self.rest_at(state.cycle, vote)? };
         self.checkpoints.adopt(Arc::new(Checkpoint { state: Arc::new(state), continuation }));
         Ok(())
     }

@@ -362,9 +362,10 @@ fn sum_of(way: &Way<'_>, state: &GlobalState, rest: &Continuation) -> protocol::
     hasher.update(way.states.finalize().as_bytes());
     let rows: Vec<&HistoryRow> = way.rows.iter().map(|row| &**row).collect();
     // How fast bodies move against each other says when to sort, which no bit depends on, and follows from when that was done before.
-    let Continuation { dt_previous, dt, quanta, vote, walls, run_totals, n_rows, spread_rate: _ } = rest;
+    let Continuation { dt_previous, dt, quanta, vote, walls, formed, run_totals, n_rows, spread_rate: _ } =
+        rest;
     codec::encode_into(&(way.failure, rows, dt_previous, dt, quanta, walls), &mut hasher)?;
-    codec::encode_into(&(run_totals, n_rows), &mut hasher)?;
+    codec::encode_into(&(formed, run_totals, n_rows), &mut hasher)?;
     // The same goes for displacements since that sort, and for the pairs that it listed.
     let vote = vote.clone().map(|vote| Vote { pairs: 0, extents: Vec::new(), ..vote });
     codec::encode_into(&vote, &mut hasher)?;

@@ -15,7 +15,7 @@ use super::Snapshot;
 use crate::disk::sync_folder;
 
 /// First bytes of a snapshot file: the form of the file and of what is in it.
-const MAGIC: &[u8; 8] = b"BLDSNAPD";
+const MAGIC: &[u8; 8] = b"BLDSNAPE";
 /// Bytes that one checksum covers.
 pub const CHUNK: usize = 1 << 20;
 /// Magic, length, cycle.

@@ -295,6 +295,7 @@ mod tests {
             spread_rate: 0.0,
             vote: Vote::empty(1),
             walls: Vec::new(),
+            formed: Vec::new(),
             run_totals: RunTotals::new(&model, &vec![1.0; model.mesh.n_nodes()]),
             rows: Vec::new(),
             states: vec![(0, 0.0), (cycle, 0.5)],

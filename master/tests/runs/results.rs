@@ -123,6 +123,7 @@ fn plates(cells: u32) -> Model {
             constraints: vec![Constraint::default()],
             walls: Vec::new(),
             bodies: Vec::new(),
+            switches: Vec::new(),
             joints: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),

@@ -305,6 +305,7 @@ fn plates(
         constraints: vec![Constraint::default()],
         walls: Vec::new(),
         bodies: Vec::new(),
+        switches: Vec::new(),
         joints: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),

@@ -273,6 +273,7 @@ fn start(material: Material, seed: u64) -> Sample {
         loads: Loads::default(),
         erosion: Erosion::default(),
         bodies: Vec::new(),
+        switches: Vec::new(),
         joints: Vec::new(),
     };
     let (force, energy) = (Quantum::for_reference(3e7, 42), Quantum::for_reference(1e6, 42));

@@ -20,6 +20,7 @@ use crate::{
 };
 
 pub mod shape;
+pub mod switch;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Body {

@@ -3,8 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    burn::Detonation, constraint::Constraint, contact, erosion::Erosion, joint::Joint, load::Loads,
-    material::Material, rigid::Body, wall::RigidWall,
+    burn::Detonation,
+    constraint::Constraint,
+    contact,
+    erosion::Erosion,
+    joint::Joint,
+    load::Loads,
+    material::Material,
+    rigid::{Body, switch::Switch},
+    wall::RigidWall,
 };
 
 /// The rules of a run. Equal on every worker.
@@ -21,6 +28,8 @@ pub struct Setup {
     pub walls: Vec<RigidWall>,
     /// Rigid bodies.
     pub bodies: Vec<Body>,
+    /// Parts that are rigid for a time.
+    pub switches: Vec<Switch>,
     /// What holds them together.
     pub joints: Vec<Joint>,
     /// Where explosives are lit.

@@ -116,6 +116,7 @@ fn domain() -> Domain {
         ],
         walls: Vec::new(),
         bodies: Vec::new(),
+        switches: Vec::new(),
         joints: Vec::new(),
         detonations: Vec::new(),
         loads: Default::default(),

@@ -29,6 +29,7 @@ fn assign(cycle: u64) -> Box<Assign> {
             constraints: Vec::new(),
             walls: Vec::new(),
             bodies: Vec::new(),
+            switches: Vec::new(),
             joints: Vec::new(),
             detonations: Vec::new(),
             loads: Default::default(),

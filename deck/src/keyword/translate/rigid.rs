@@ -2,9 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use mechanics::load::Span;
+
 use super::{
     condition::driven,
     state::{Bodies, Translation},
+    switch,
 };
 use crate::{
     keyword::{
@@ -22,6 +25,7 @@ const FREE: Components = [const { None }; 3];
 /// Finds the rigid bodies: parts of rigid material, parts that become rigid, and what belongs together.
 pub(super) fn find_bodies(t: &mut Translation<'_>) {
     let (problem, log) = (t.problem, t.log);
+    t.switched = switch::Switched::of(t);
     let mut bodies = Bodies::default();
     for (&id, part) in problem.parts.iter().filter(|(id, _)| t.names.contains_key(id)) {
         if matches!(problem.materials.get(&part.material.value).map(|m| &m.law), Some(Law::Rigid { .. })) {
@@ -35,6 +39,9 @@ pub(super) fn find_bodies(t: &mut Translation<'_>) {
             Members::Set(id) => problem.part_set(id, card.at, log),
         };
         for id in members {
+            if card.switched && t.switched.is_timed(id) {
+                continue;
+            }
             if !problem.parts.contains_key(&id) {
                 log.fault(card.at, format!("part {id}"), "a part of the deck", "correct the number");
             } else if card.switched && t.names.contains_key(&id) {
@@ -180,6 +187,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
             velocity,
             spin,
             circle,
+            span: Span::ALWAYS,
         });
     }
     for given in &problem.rigid.of_nodes {
@@ -217,6 +225,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
             velocity,
             spin,
             circle,
+            span: Span::ALWAYS,
         });
     }
 }

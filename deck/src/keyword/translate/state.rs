@@ -2,7 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::motion::{integrals, rates};
+use super::{
+    motion::{integrals, rates},
+    switch::Switched,
+};
 use crate::{
     keyword::{
         condition::{Meaning, Target},
@@ -44,6 +47,8 @@ pub(super) struct Translation<'p> {
     curves: BTreeMap<String, (Place, Vec<[f64; 2]>)>,
     /// Parts that are rigid.
     pub(super) bodies: Bodies,
+    /// Parts that are rigid for a time.
+    pub(super) switched: Switched,
     /// Pairs of parts that meet, lower number first.
     pub(super) met: BTreeSet<(u32, u32)>,
 }
@@ -64,6 +69,7 @@ impl<'p> Translation<'p> {
             without_section: BTreeSet::new(),
             curves: BTreeMap::new(),
             bodies: Bodies::default(),
+            switched: Switched::default(),
             met: BTreeSet::new(),
         }
     }

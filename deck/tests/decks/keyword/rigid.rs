@@ -177,7 +177,7 @@ fn what_cannot_be_honoured_of_rigid_bodies_is_refused_at_its_line() {
         (
             "*DEFORMABLE_TO_RIGID_AUTOMATIC\n1\n",
             0,
-            "read *DEFORMABLE_TO_RIGID_AUTOMATIC; expected parts that are rigid all along",
+            "read *DEFORMABLE_TO_RIGID_AUTOMATIC with less than two cards; expected when parts switch",
         ),
         (
             "*DEFORMABLE_TO_RIGID_INERTIA\n1\n",

@@ -178,3 +178,61 @@ fn plain_contact_is_that_of_automatic_and_interior_contact_is_left_out_with_word
     warned(interior, "turns inside out stops with an error");
     assert!(fault("*CONTACT_DRAWBEAD\n1,2,3,3\n\n\n").contains("a contact of the table"));
 }
+
+/// The parts that are rigid for a time, and when.
+fn switches(more: &str) -> Vec<(Vec<u32>, Span)> {
+    good(more).setup.switches.into_iter().map(|switch| (switch.parts, switch.span)).collect()
+}
+
+#[test]
+fn automatic_switches_make_parts_rigid_for_a_time() {
+    let at = |time: &str, counts: &str, parts: &str| {
+        format!("*DEFORMABLE_TO_RIGID_AUTOMATIC\n1,0,{time}\n0,0,0,0,{counts}\n{parts}")
+    };
+    let on = at("2e-7", "1,0", "1,0\n");
+    let off = at("5e-7", "0,1", "1\n");
+    assert_eq!(switches(&format!("{on}{off}")), [(vec![0], SPAN)]);
+    // In whatever order the cards stand, and to the end of the run.
+    assert_eq!(switches(&format!("{off}{on}")), [(vec![0], SPAN)]);
+    let to_the_end = Span { from: 2e-7, ..Span::ALWAYS };
+    assert_eq!(switches(&on), [(vec![0], to_the_end)]);
+    // From the start, by the keyword for that.
+    let first = "*DEFORMABLE_TO_RIGID\n1\n";
+    let begun = Span { from: 0.0, until: 5e-7 };
+    assert_eq!(switches(&format!("{first}{off}")), [(vec![0], begun)]);
+    // Twice, and of a set.
+    let again = at("7e-7", "1,0", "1\n");
+    let later = Span { from: 7e-7, ..Span::ALWAYS };
+    assert_eq!(switches(&format!("{on}{off}{again}")), [(vec![0], SPAN), (vec![0], later)]);
+    let set = format!(
+        "*SET_PART_LIST\n3\n1,2\n{}{}",
+        at("2e-7", "1,0", "3,0,PSET\n"),
+        at("5e-7", "0,1", "3,PSET\n")
+    );
+    assert_eq!(switches(&set), [(vec![0], SPAN), (vec![1], SPAN)]);
+    // One body where a card joins them.
+    let joined = format!("{}{}", at("2e-7", "2,0", "1,0\n2,1\n"), at("5e-7", "0,2", "1\n2\n"));
+    assert_eq!(switches(&joined), [(vec![0, 1], SPAN)]);
+    warned(&format!("{on}{on}"), "part 1 is rigid before already");
+}
+
+#[test]
+fn automatic_switches_that_cannot_be_honoured_are_refused() {
+    let refused = [
+        ("1,3,2e-7\n0,0,0,0,1,0\n1\n", "expected CODE 0: a switch at TIME1"),
+        ("1,0,2e-7,0,0,0,2\n0,0,0,0,1,0\n1\n", "expected no related switch set"),
+        ("1,0,2e-7\n0,0,1,0,1,0\n1\n", "expected 0: nodal rigid bodies"),
+        ("1,0,2e-7\n0,0,0,0,2,0\n1\n", "expected the number of cards behind this one, 1"),
+        ("1,0,2e-7\n0,0,0,0,1,0\n7\n", "read part 7"),
+        ("1,0,2e-7\n0,0,0,0,1,0\n1,2\n", "read part 1, which joins part 2"),
+        ("1,0,2e-7\n0,0,0,0,1,0\n1,0,SHELL\n", "expected PTYPE PART or PSET"),
+        ("1,0,-2e-7\n0,0,0,0,1,0\n1\n", "read -2e-7"),
+    ];
+    for (cards, words) in refused {
+        let said = fault(&format!("*DEFORMABLE_TO_RIGID_AUTOMATIC\n{cards}"));
+        assert!(said.contains(words), "{cards}: {said}");
+    }
+    let rigid = "*MAT_RIGID\n2,7.85e-9,2.1e5,0.3\n1,0,0\n*PART\nthird\n3,1,2\n*ELEMENT_SOLID\n3,3,5,6,7,8,11,12,13,14\n";
+    let said = fault(&format!("{rigid}*DEFORMABLE_TO_RIGID_AUTOMATIC\n1,0,2e-7\n0,0,0,0,1,0\n3\n"));
+    assert!(said.contains("read part 3 of *MAT_RIGID"), "{said}");
+}

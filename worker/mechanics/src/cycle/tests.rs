@@ -96,6 +96,7 @@ fn setup(friction: f64) -> Setup {
         loads: Loads::default(),
         erosion: Erosion::default(),
         bodies: Vec::new(),
+        switches: Vec::new(),
         joints: Vec::new(),
     }
 }

@@ -16,7 +16,7 @@ use crate::{
     load::{Drive, Loads},
     material::Material,
     mesh::{CORNERS, Mesh, Part, Topology, quad_area},
-    vectors::{cross, dot},
+    vectors::{cross, dot, minus},
 };
 
 /// What a deck says of a body.
@@ -128,8 +128,7 @@ pub fn body(
     (0..nodes.len()).for_each(|i| lumped.add(mass_of(i), places[i]));
     let lumped_inertia = lumped.inertia();
     if is_of_nodes {
-        let largest = inertia[0].max(inertia[1]).max(inertia[2]);
-        (0..3).for_each(|a| inertia[a] += LINE_INERTIA * largest);
+        widen(&mut inertia);
     }
     let spare: [f64; 6] = std::array::from_fn(|i| inertia[i] - LEAST_INERTIA * lumped_inertia[i]);
     if !is_positive(&inertia) || !is_positive(&spare) {
@@ -160,26 +159,9 @@ pub fn body(
     }
     let radius = places.iter().flatten().fold(0.0_f64, |r, c| r.max(c.abs()));
     let (constraints, of_node) = constraints;
-    let mut forces = Vec::new();
-    let mut pulled: BTreeMap<u32, Moments> = BTreeMap::new();
-    for (i, &n) in (0..).zip(&nodes) {
-        let mut bits = constraints[of_node[n as usize] as usize].forces;
-        while bits != 0 {
-            let load = bits.trailing_zeros();
-            if loads.forces[load as usize].by_mass {
-                pulled.entry(load).or_default().add(mass_of(i as usize), places[i as usize]);
-            } else {
-                forces.push((i, load));
-            }
-            bits &= bits - 1;
-        }
-    }
-    // What all nodes feel pulls at the centre of the body, which that of the nodes' masses is not quite for distorted elements.
-    let pull = |(load, felt): (u32, Moments)| match felt.mass >= lumped.mass * (1.0 - 1e-12) {
-        true => Pull { load, mass: all.mass, place: [0.0; 3] },
-        false => Pull { load, mass: felt.mass, place: felt.first.map(|c| c / felt.mass) },
-    };
-    let pulls = pulled.into_iter().map(pull).collect();
+    let constraint: Vec<u16> = nodes.iter().map(|&n| of_node[n as usize]).collect();
+    let masses = [lumped.mass, all.mass];
+    let (forces, pulls) = forces_on((constraints, &constraint), loads, &places, &mass_of, masses);
     Ok(Body {
         parts: given.parts,
         account: account.unwrap_or(0),
@@ -197,6 +179,43 @@ pub fn body(
         forces,
         pulls,
     })
+}
+
+/// Gives nodes on a line inertia about it.
+pub(super) fn widen(inertia: &mut [f64; 6]) {
+    let largest = inertia[0].max(inertia[1]).max(inertia[2]);
+    (0..3).for_each(|a| inertia[a] += LINE_INERTIA * largest);
+}
+
+/// The nodal forces on a body whose nodes at `places` have these constraints, and its forces by mass. `masses` are those of its nodes and
+/// of the body.
+pub(super) fn forces_on(
+    (constraints, of_node): (&[Constraint], &[u16]),
+    loads: &Loads,
+    places: &[[f64; 3]],
+    mass_of: &dyn Fn(usize) -> f64,
+    [of_nodes, of_body]: [f64; 2],
+) -> (Vec<(u32, u32)>, Vec<Pull>) {
+    let mut forces = Vec::new();
+    let mut pulled: BTreeMap<u32, Moments> = BTreeMap::new();
+    for (i, &constraint) in of_node.iter().enumerate() {
+        let mut bits = constraints[constraint as usize].forces;
+        while bits != 0 {
+            let load = bits.trailing_zeros();
+            if loads.forces[load as usize].by_mass {
+                pulled.entry(load).or_default().add(mass_of(i), places[i]);
+            } else {
+                forces.push((i as u32, load));
+            }
+            bits &= bits - 1;
+        }
+    }
+    // What all nodes feel pulls at the centre of the body, which that of the nodes' masses is not quite for distorted elements.
+    let pull = |(load, felt): (u32, Moments)| match felt.mass >= of_nodes * (1.0 - 1e-12) {
+        true => Pull { load, mass: of_body, place: [0.0; 3] },
+        false => Pull { load, mass: felt.mass, place: felt.first.map(|c| c / felt.mass) },
+    };
+    (forces, pulled.into_iter().map(pull).collect())
 }
 
 /// The least Courant limit of the elements of some parts (ascending) at rest, and its element: what they would have if
@@ -241,7 +260,7 @@ fn least_height(part: &Part, x: &[[f64; 3]; 8]) -> f64 {
 }
 
 /// The state of a body that begins at `centre` with this velocity and angular velocity.
-fn starting(inertia: &[f64; 6], centre: [f64; 3], velocity: [f64; 3], spin: [f64; 3]) -> State {
+pub(super) fn starting(inertia: &[f64; 6], centre: [f64; 3], velocity: [f64; 3], spin: [f64; 3]) -> State {
     let momentum = full(inertia).map(|row| dot(row, spin));
     State { centre, velocity, attitude: [1.0, 0.0, 0.0, 0.0], momentum, spin }
 }
@@ -276,8 +295,8 @@ fn motion(
 
 /// Mass, first moments and second moments xx, yy, zz, xy, yz, zx.
 #[derive(Clone, Copy, Debug, Default)]
-struct Moments {
-    mass: f64,
+pub(super) struct Moments {
+    pub(super) mass: f64,
     first: [f64; 3],
     second: [f64; 6],
 }
@@ -286,7 +305,7 @@ struct Moments {
 const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]];
 
 impl Moments {
-    fn add(&mut self, mass: f64, x: [f64; 3]) {
+    pub(super) fn add(&mut self, mass: f64, x: [f64; 3]) {
         self.mass += mass;
         (0..3).for_each(|a| self.first[a] += mass * x[a]);
         for (sum, [a, b]) in self.second.iter_mut().zip(PAIRS) {
@@ -417,7 +436,7 @@ impl Moments {
     }
 
     /// Centre and inertia about it.
-    fn central(&self) -> ([f64; 3], [f64; 6]) {
+    pub(super) fn central(&self) -> ([f64; 3], [f64; 6]) {
         let centre = self.first.map(|c| c / self.mass);
         let mut moved = *self;
         for (sum, [a, b]) in moved.second.iter_mut().zip(PAIRS) {
@@ -442,12 +461,8 @@ fn mapped(x: &[[f64; 3]; 8], at: [f64; 3]) -> ([f64; 3], f64) {
 }
 
 /// Whether a symmetric matrix is positive definite.
-fn is_positive(m: &[f64; 6]) -> bool {
+pub(super) fn is_positive(m: &[f64; 6]) -> bool {
     let [xx, yy, _, xy, _, _] = *m;
     let rows = full(m);
     xx > 0.0 && xx * yy > xy * xy && dot(rows[0], cross(rows[1], rows[2])) > 0.0
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
 }
