@@ -39,6 +39,7 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/hexahedron.rs"),
         include_str!("../src/book/modes.rs"),
         include_str!("../src/book/law.rs"),
+        include_str!("../src/book/cloud.rs"),
         include_str!("../src/book/perforation.rs"),
         include_str!("../src/book/porous.rs"),
         include_str!("../src/book/zone.rs"),

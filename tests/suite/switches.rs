@@ -205,3 +205,47 @@ fn losses_and_snapshots_while_parts_switch_change_no_bit() {
         }
     }
 }
+
+/// A part that is led from rest: contact knows of the jump before it comes.
+#[test]
+fn a_part_that_is_led_from_rest_moves_as_prescribed_without_passing_the_gap() {
+    let mut model = model(
+        r#"
+        title = "a ram that begins to move"
+        units = "SI"
+        [control]
+        end_time = 4e-5
+        [output]
+        history_cycles = 1
+        [[part]]
+        name = "ram"
+        material = "AL_2024_T351"
+        box = { origin = [0, 0, 0.0101], size = [0.01, 0.01, 0.01], cells = [4, 4, 4] }
+        [[part]]
+        name = "anvil"
+        material = "AL_2024_T351"
+        box = { origin = [0, 0, 0], size = [0.01, 0.01, 0.01], cells = [4, 4, 4] }
+        [contact]
+        gap_length = 1e-4
+        [[rigid]]
+        parts = ["ram"]
+        from = 1e-5
+        until = 3e-5
+        velocity = { z = -150 }
+        "#,
+    );
+    model.setup.control.end_cycle = 2000;
+    let solved = run(model);
+    let totals = &solved.outcome.run_totals;
+    println!("{:.3} gaps in a cycle at most, error {:.1e}", totals.worst_gap_travel, totals.last.error);
+    assert!(totals.worst_gap_travel <= 0.2 && totals.last.error.abs() < 1e-2, "{totals:?}");
+    let mass = totals.masses[0];
+    let speeds = solved.rows.iter().map(|row| (row.time, row.part_momenta[0][2] / mass));
+    for (time, speed) in speeds {
+        if time < 1e-5 {
+            assert_eq!(speed, 0.0, "at {time}");
+        } else if (1.1e-5..2.9e-5).contains(&time) {
+            assert!((speed + 150.0).abs() < 1e-6, "{speed} at {time}");
+        }
+    }
+}

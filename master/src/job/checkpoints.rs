@@ -154,7 +154,10 @@ fn fits(formed: &Formed, problem: &Problem) -> bool {
     let Formed { switch, body, constraint } = formed;
     let n = body.nodes.len();
     let setup = &problem.model.setup;
-    (*switch as usize) < setup.switches.len()
+    let loads = body.forces.iter().map(|(_, load)| *load).chain(body.pulls.iter().map(|pull| pull.load));
+    setup.switches.get(*switch as usize).is_some_and(|switch| switch.parts.first() == Some(&body.account))
+        && body.forces.iter().all(|(place, _)| (*place as usize) < n)
+        && loads.into_iter().all(|load| (load as usize) < setup.loads.forces.len())
         && (body.places.len(), constraint.len()) == (n, n)
         && body.nodes.iter().all(|&node| (node as usize) < problem.model.mesh.n_nodes())
         && constraint.iter().all(|&constraint| usize::from(constraint) < setup.constraints.len())

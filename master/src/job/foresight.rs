@@ -8,6 +8,7 @@ use mechanics::{
     constraint::Circle,
     contact::Surface,
     load::{Curve, Drive},
+    mesh::Mesh,
     setup::Setup,
     state::GlobalState,
 };
@@ -41,7 +42,7 @@ pub(super) struct Window {
 impl Foresight {
     /// Of a problem whose walls are bound, as it starts: `surface` has the nodes that contact watches. Where elements erode any node may
     /// come to the surface.
-    pub(super) fn of(setup: &Setup, start: &GlobalState, surface: &Surface) -> Self {
+    pub(super) fn of(mesh: &Mesh, setup: &Setup, start: &GlobalState, surface: &Surface) -> Self {
         // Of the constraints of watched nodes the longest arm.
         let mut circle_arm: Vec<Option<f64>> = vec![None; setup.constraints.len()];
         let mut watch = |node: usize| {
@@ -66,7 +67,11 @@ impl Foresight {
             Mover::of(&body.velocity, body.spin.iter().flatten().map(|&rate| (rate, reach)).chain(circle))
         });
         let mut movers: Vec<Mover> = Vec::new();
-        for mover in of_nodes.chain(of_bodies) {
+        let of_switches = setup.switches.iter().map(|switch| {
+            let reach = switch.reach(mesh);
+            Mover::of(&switch.velocity, switch.spin.iter().flatten().map(|&rate| (rate, reach)))
+        });
+        for mover in of_nodes.chain(of_bodies).chain(of_switches) {
             if mover.moves() && !movers.contains(&mover) {
                 movers.push(mover);
             }

@@ -97,7 +97,7 @@ impl Touching {
             refuse_crossing(model, &surface, &crossing, settings)?;
         }
         let exclusions = Arc::new(exclusions.with_edges(&surface, &crossing));
-        let foresight = Foresight::of(&model.setup, start, &surface);
+        let foresight = Foresight::of(&model.mesh, &model.setup, start, &surface);
         Ok(Some(Self { surface: Arc::new(surface), exclusions, foresight }))
     }
 }

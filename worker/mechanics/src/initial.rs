@@ -13,7 +13,7 @@ use crate::{
     load::{Drive, SurfaceKind},
     material::Material,
     mesh::{FACES, Mesh, Part, SolidAxes, Topology, axes::turn, laminate},
-    rigid::Body,
+    rigid::{Body, switch::Switch},
     setup::Setup,
     state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field, write_changed},
     vectors::{cross, dot},
@@ -309,17 +309,20 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         Motion::Free { velocity, .. } => velocity.iter().map(|v| v * v).sum::<f64>(),
     };
     let walls2 = setup.walls.iter().map(of_wall).fold(0.0, f64::max);
+    let size = |drives: &[Option<Drive>; 3]| {
+        drives.iter().flatten().map(|v| v.greatest(curves).powi(2)).sum::<f64>().sqrt()
+    };
     let of_body = |body: &Body| {
-        let size = |drives: &[Option<Drive>; 3]| {
-            drives.iter().flatten().map(|v| v.greatest(curves).powi(2)).sum::<f64>().sqrt()
-        };
         let reach = body.places.iter().map(|x| dot(*x, *x)).fold(0.0, f64::max).sqrt();
         let about = body.circle.map_or(0.0, |circle| {
             circle.rate.greatest(curves).mul_add(reach, fastest(&circle, &body.start.centre).sqrt())
         });
         (size(&body.spin).mul_add(reach, size(&body.velocity)) + about).powi(2)
     };
-    let bodies2 = setup.bodies.iter().map(of_body).fold(0.0, f64::max);
+    let of_switch =
+        |switch: &Switch| size(&switch.spin).mul_add(switch.reach(mesh), size(&switch.velocity)).powi(2);
+    let switches2 = setup.switches.iter().map(of_switch).fold(0.0, f64::max);
+    let bodies2 = setup.bodies.iter().map(of_body).fold(switches2, f64::max);
     let top_speed2 = speed2.max(prescribed2).max(turned2).max(walls2).max(bodies2);
     let pressure = setup
         .loads

@@ -2,6 +2,7 @@
 
 use mechanics::{
     constraint::Constraint,
+    load::{Drive, Span},
     material::Material,
     rigid::{Body, shape, switch::Switch},
 };
@@ -102,12 +103,22 @@ pub(in crate::make) fn make_for_a_time(
             );
             continue;
         };
+        // What leads the body acts while it is one, and begins with it as a jump.
+        let within = |drives: [Option<Drive>; 3]| {
+            drives.map(|drive| drive.map(|drive| Drive { span: overlap(drive.span, rigid.span), ..drive }))
+        };
         switches.push(Switch {
             parts: given.parts.clone(),
             span: rigid.span,
-            velocity: held.velocity,
-            spin: held.spin,
+            velocity: within(held.velocity),
+            spin: within(held.spin),
         });
     }
     switches
+}
+
+/// The times that are in both.
+fn overlap(a: Span, b: Span) -> Span {
+    let from = a.from.max(b.from);
+    Span { from, until: a.until.min(b.until).max(from) }
 }

@@ -41,6 +41,19 @@ pub struct Switch {
     pub spin: [Option<Drive>; 3],
 }
 
+impl Switch {
+    /// The longest distance of a node from the middle of the nodes, as the deck has them (length).
+    pub fn reach(&self, mesh: &Mesh) -> f64 {
+        let places = || {
+            let nodes = self.parts.iter().flat_map(|&p| &mesh.parts[p as usize].nodes);
+            nodes.map(|&n| mesh.positions[n as usize])
+        };
+        let n = places().count().max(1) as f64;
+        let middle: [f64; 3] = std::array::from_fn(|a| places().map(|x| x[a]).sum::<f64>() / n);
+        places().map(|x| minus(x, middle)).map(|arm| dot(arm, arm)).fold(0.0, f64::max).sqrt()
+    }
+}
+
 /// A body that has formed and has not ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Formed {
