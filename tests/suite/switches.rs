@@ -220,13 +220,13 @@ fn a_part_that_is_led_from_rest_moves_as_prescribed_without_passing_the_gap() {
         [[part]]
         name = "ram"
         material = "AL_2024_T351"
-        box = { origin = [0, 0, 0.0101], size = [0.01, 0.01, 0.01], cells = [4, 4, 4] }
+        box = { origin = [0, 0, 0.0105], size = [0.01, 0.01, 0.01], cells = [4, 4, 4] }
         [[part]]
         name = "anvil"
         material = "AL_2024_T351"
         box = { origin = [0, 0, 0], size = [0.01, 0.01, 0.01], cells = [4, 4, 4] }
         [contact]
-        gap_length = 1e-4
+        gap_length = 3e-4
         [[rigid]]
         parts = ["ram"]
         from = 1e-5

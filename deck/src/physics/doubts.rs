@@ -146,7 +146,11 @@ fn is_driven(model: &Model) -> bool {
     let setup = &model.setup;
     let drives = setup.constraints.iter().flat_map(|c| c.velocity).flatten();
     let of_bodies = setup.bodies.iter().flat_map(|body| body.velocity.iter().chain(&body.spin)).flatten();
-    drives.chain(of_bodies.copied()).any(|drive| drive.greatest(&setup.loads.curves) > 0.0)
+    let of_switches = setup.switches.iter().flat_map(|part| part.velocity.iter().chain(&part.spin)).flatten();
+    drives
+        .chain(of_bodies.copied())
+        .chain(of_switches.copied())
+        .any(|drive| drive.greatest(&setup.loads.curves) > 0.0)
         || setup.loads.gravity.is_some()
         || !setup.loads.forces.is_empty()
         || !setup.loads.surfaces.is_empty()
