@@ -251,10 +251,15 @@ impl Advance<'_> {
             change.z = loss.neg_mul_add(old.z, L::splat(gain[2]));
             new = Vector { x: new.x + change.x, y: new.y + change.y, z: new.z + change.z };
         }
-        if set.strikes != 0 {
-            tally.closing = tally.closing.max(self.closing(nodes, set.strikes, at, &x, &old));
+        let mut near = 0;
+        let mut held = set.held;
+        if held != 0 {
+            [held, near] = self.not_clear(nodes, set, at, &x, &new);
         }
-        let set = NodeSet { held: self.not_clear(nodes, set.held, at, &x, &new), ..set };
+        if near != 0 {
+            tally.closing = tally.closing.max(self.closing(nodes, near, at));
+        }
+        let set = NodeSet { held, ..set };
         if set.held != 0 {
             let mut held = arrays(&new);
             tally.external.merge(self.hold(nodes, set, at, &mut held));

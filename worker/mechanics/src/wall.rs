@@ -192,83 +192,60 @@ pub fn advance(walls: &[RigidWall], votes: &[WallVote], dt: f64, free: &mut [Pos
 }
 
 impl RigidWall {
-    /// The nodes that [`RigidWall::stop`] would leave alone, for many nodes at once; it rounds as `stop` does.
+    /// The nodes that [`RigidWall::stop`] would leave alone in a step of `dt`, for many nodes at once, rounding as `stop` does; and those that
+    /// do not come to the wall within `reach` (time) either, as fast as they are.
     #[inline(always)]
-    pub(crate) fn clear<L: Lane>(&self, pose: &Pose, x: &Vector<L>, v: &Vector<L>, dt: f64) -> L::Mask {
-        let each = |[x, y, z]: [f64; 3]| Vector { x: L::splat(x), y: L::splat(y), z: L::splat(z) };
-        let less = |a: &Vector<L>, b: &Vector<L>| Vector { x: a.x - b.x, y: a.y - b.y, z: a.z - b.z };
-        let sum = |a: &Vector<L>, b: &Vector<L>| a.x * b.x + a.y * b.y + a.z * b.z;
-        let (zero, step) = (L::splat(0.0), L::splat(dt));
-        let [moved, speed] = *pose;
-        let (x, v) = (less(x, &each(moved)), less(v, &each(speed)));
-        let end = || Vector { x: x.x + v.x * step, y: x.y + v.y * step, z: x.z + v.z * step };
-        let outside = |from: &Vector<L>, radius: f64| sum(from, from).sqrt() - L::splat(radius);
-        let height = match self.shape {
-            Shape::Plane { point, normal } => {
-                let normal = each(normal);
-                sum(&less(&x, &each(point)), &normal) + sum(&v, &normal) * step
-            }
-            Shape::Cylinder { point, axis, radius } => {
-                let (from, axis) = (less(&end(), &each(point)), each(axis));
-                let along = sum(&from, &axis);
-                let across = Vector {
-                    x: along.neg_mul_add(axis.x, from.x),
-                    y: along.neg_mul_add(axis.y, from.y),
-                    z: along.neg_mul_add(axis.z, from.z),
-                };
-                outside(&across, radius)
-            }
-            Shape::Sphere { centre, radius } => outside(&less(&end(), &each(centre)), radius),
-        };
-        zero.less_equal(height)
-    }
-
-    /// Whether nodes at `x` may strike the wall within `reach` (time), as fast as they are, for many at once: never false where
-    /// [`RigidWall::closing`] is not zero but for rounding, which is the same on all widths.
-    #[inline(always)]
-    pub(crate) fn within_reach<L: Lane>(
+    pub(crate) fn clear<L: Lane>(
         &self,
         pose: &Pose,
         x: &Vector<L>,
         v: &Vector<L>,
-        reach: f64,
-    ) -> L::Mask {
+        [dt, reach]: [f64; 2],
+    ) -> [L::Mask; 2] {
         let each = |[x, y, z]: [f64; 3]| Vector { x: L::splat(x), y: L::splat(y), z: L::splat(z) };
         let less = |a: &Vector<L>, b: &Vector<L>| Vector { x: a.x - b.x, y: a.y - b.y, z: a.z - b.z };
         let sum = |a: &Vector<L>, b: &Vector<L>| a.x * b.x + a.y * b.y + a.z * b.z;
-        let (zero, reach) = (L::splat(0.0), L::splat(reach));
+        let (zero, step, reach) = (L::splat(0.0), L::splat(dt), L::splat(reach));
         let [moved, speed] = *pose;
         let (x, v) = (less(x, &each(moved)), less(v, &each(speed)));
-        let round = |from: &Vector<L>, radius: f64| {
+        let end = || Vector { x: x.x + v.x * step, y: x.y + v.y * step, z: x.z + v.z * step };
+        let outside = |from: &Vector<L>, radius: f64| sum(from, from).sqrt() - L::splat(radius);
+        // The shape bulges outwards: a node is no sooner there than on the straight way to the nearest point.
+        let later = |from: &Vector<L>, radius: f64| {
             let distance = sum(from, from).sqrt();
             (distance - L::splat(radius)) * distance + sum(&v, from) * reach
         };
-        let height = match self.shape {
+        let [height, height_later] = match self.shape {
             Shape::Plane { point, normal } => {
                 let normal = each(normal);
-                sum(&less(&x, &each(point)), &normal) + sum(&v, &normal) * reach
+                let (height, approach) = (sum(&less(&x, &each(point)), &normal), sum(&v, &normal));
+                [height + approach * step, height + approach * reach]
             }
             Shape::Cylinder { point, axis, radius } => {
-                let (from, axis) = (less(&x, &each(point)), each(axis));
-                let along = sum(&from, &axis);
-                let across = Vector {
-                    x: along.neg_mul_add(axis.x, from.x),
-                    y: along.neg_mul_add(axis.y, from.y),
-                    z: along.neg_mul_add(axis.z, from.z),
+                let axis = each(axis);
+                let across = |x: &Vector<L>| {
+                    let from = less(x, &each(point));
+                    let along = sum(&from, &axis);
+                    Vector {
+                        x: along.neg_mul_add(axis.x, from.x),
+                        y: along.neg_mul_add(axis.y, from.y),
+                        z: along.neg_mul_add(axis.z, from.z),
+                    }
                 };
-                round(&across, radius)
+                [outside(&across(&end()), radius), later(&across(&x), radius)]
             }
-            Shape::Sphere { centre, radius } => round(&less(&x, &each(centre)), radius),
+            Shape::Sphere { centre, radius } => {
+                [outside(&less(&end(), &each(centre)), radius), later(&less(&x, &each(centre)), radius)]
+            }
         };
-        height.less(zero)
+        [zero.less_equal(height), zero.less_equal(height_later)]
     }
 
-    /// The speed at which a node closes in on the wall, if it strikes within `reach` (time) as fast as it is; else zero. What the
+    /// The speed at which a node closes in on the wall, if it may strike within `reach` (time) as fast as it is; else zero. What the
     /// wall stops at once, elements behind it feel as a jump.
     pub fn closing(&self, [moved, speed]: &Pose, x: [f64; 3], v: [f64; 3], reach: f64) -> f64 {
         let (height, normal) = self.shape.height(std::array::from_fn(|a| x[a] - moved[a]));
         let closing = -(0..3).map(|a| (v[a] - speed[a]) * normal[a]).sum::<f64>();
-        // Material is outside of shapes that bulge outwards: nothing strikes earlier than on the straight way to the nearest point.
         if closing > 0.0 && height < closing * reach { closing } else { 0.0 }
     }
 
@@ -358,7 +335,7 @@ mod tests {
 
         fn run<L: Lane>(self) {
             let (pose, dt) = ([[0.3, -0.2, 0.1], [2.0, 1.0, -4.0]], 1e-3);
-            let mut n_clear = 0;
+            let (mut n_clear, mut n_far) = (0, 0);
             for start in 0..200 {
                 let node = |lane: usize| {
                     let angle = (start * L::N + lane) as f64 * 0.37;
@@ -391,14 +368,22 @@ mod tests {
                     z: lanes(&|i| of(i)[2]),
                 };
                 let (x, v) = (each(&|i| node(i).0), each(&|i| node(i).1));
-                let clear = L::bits(self.0.clear(&pose, &x, &v, dt));
+                let reach = 3.0 * dt;
+                let [clear, far] = self.0.clear(&pose, &x, &v, [dt, reach]).map(L::bits);
                 for lane in 0..L::N {
                     let (x, mut v) = node(lane);
+                    // Alike but for rounding, which decides where it is a hair.
+                    let (is_far, soon) =
+                        (far >> lane & 1 == 1, self.0.closing(&pose, x, v, (1.0 - 1e-9) * reach));
+                    let late = self.0.closing(&pose, x, v, (1.0 + 1e-9) * reach);
+                    assert!(if is_far { soon == 0.0 } else { late > 0.0 }, "{:?}: {x:?} {v:?}", self.0.shape);
+                    n_far += usize::from(is_far);
                     let is_clear = !self.0.stop(&pose, x, &mut v, dt);
                     assert_eq!(clear >> lane & 1 == 1, is_clear, "{:?}: {x:?} {v:?}", self.0.shape);
                     n_clear += usize::from(is_clear);
                 }
             }
+            assert!((20..200 * L::N - 20).contains(&n_far), "{n_far} are far from {:?}", self.0.shape);
             assert!((20..200 * L::N - 20).contains(&n_clear), "{n_clear} are clear of {:?}", self.0.shape);
         }
     }

@@ -12,75 +12,59 @@ use crate::{
 const FORESEEN: f64 = 3.0;
 
 impl Advance<'_> {
-    /// The greatest speed at which one of these nodes from `at` on closes in on a wall that it may strike in this step or the next one. `v`
-    /// are the velocities before the step: a node that rests on a wall has none against it, however hard it is pressed.
-    #[inline(always)]
-    pub(super) fn closing<L: Lane>(
-        &self,
-        nodes: &Nodes<'_>,
-        strikes: u8,
-        at: usize,
-        x: &Vector<L>,
-        v: &Vector<L>,
-    ) -> f64 {
-        let reach = FORESEEN * self.dt;
-        let walls_of = |lane: u32| self.constraints[usize::from(nodes.constraint[at + lane as usize])].walls;
-        let (mut left, mut walls) = (strikes, 0);
-        while left != 0 {
-            walls |= walls_of(left.trailing_zeros());
-            left &= left - 1;
-        }
-        let mut greatest = 0.0_f64;
-        while walls != 0 {
-            let w = walls.trailing_zeros() as usize;
-            walls &= walls - 1;
-            let mut near = strikes & L::bits(self.walls[w].within_reach(&self.poses[w], x, v, reach)) as u8;
-            while near != 0 {
-                let lane = near.trailing_zeros();
-                near &= near - 1;
-                if walls_of(lane) >> w & 1 == 1 {
-                    let i = at + lane as usize;
-                    let of = |along: &[Vec<f64>; 3]| std::array::from_fn(|a| along[a][i]);
-                    let closing = self.walls[w].closing(&self.poses[w], of(nodes.x), of(nodes.v), reach);
-                    greatest = greatest.max(closing);
-                }
-            }
-        }
-        greatest
-    }
-
     /// Those of the held nodes from `at` on that [`Advance::hold`] must see: not those that feel only walls and are clear
-    /// of them in this step, which most are. `v` are the free velocities.
+    /// of them in this step, which most are. And those of `set.strikes` that may strike a wall soon. `v` are the free velocities.
     #[inline(always)]
     pub(super) fn not_clear<L: Lane>(
         &self,
         nodes: &Nodes<'_>,
-        held: u8,
+        set: NodeSet,
         at: usize,
         x: &Vector<L>,
         v: &Vector<L>,
-    ) -> u8 {
+    ) -> [u8; 2] {
+        let held = set.held;
         let (mut left, mut kept, mut walls) = (held, 0, 0);
         while left != 0 {
             let lane = left.trailing_zeros();
             let constraint = &self.constraints[usize::from(nodes.constraint[at + lane as usize])];
-            if constraint.is_of_walls() {
-                walls |= constraint.walls;
-            } else {
+            walls |= constraint.walls;
+            if !constraint.is_of_walls() {
                 kept |= 1 << lane;
             }
             left &= left - 1;
         }
-        if kept == held {
-            return held;
+        if walls == 0 || (kept == held && set.strikes == 0) {
+            return [held, 0];
         }
-        let mut clear = L::mask(u32::MAX);
+        let times = [self.dt, FORESEEN * self.dt];
+        let [mut clear, mut far] = [L::mask(u32::MAX); 2];
         while walls != 0 {
             let w = walls.trailing_zeros() as usize;
-            clear = L::both(clear, self.walls[w].clear(&self.poses[w], x, v, self.dt));
+            let [now, soon] = self.walls[w].clear(&self.poses[w], x, v, times);
+            (clear, far) = (L::both(clear, now), L::both(far, soon));
             walls &= walls - 1;
         }
-        kept | held & !(L::bits(clear) as u8)
+        [kept | held & !(L::bits(clear) as u8), set.strikes & !(L::bits(far) as u8)]
+    }
+
+    /// The greatest speed at which one of these nodes from `at` on closes in on a wall that it may strike soon. It is that before the step: a
+    /// node that rests on a wall has none against it, however hard it is pressed.
+    pub(super) fn closing(&self, nodes: &Nodes<'_>, mut near: u8, at: usize) -> f64 {
+        let mut greatest = 0.0_f64;
+        while near != 0 {
+            let i = at + near.trailing_zeros() as usize;
+            near &= near - 1;
+            let of = |along: &[Vec<f64>; 3]| std::array::from_fn(|a| along[a][i]);
+            let mut walls = self.constraints[usize::from(nodes.constraint[i])].walls;
+            while walls != 0 {
+                let w = walls.trailing_zeros() as usize;
+                walls &= walls - 1;
+                let (pose, reach) = (&self.poses[w], FORESEEN * self.dt);
+                greatest = greatest.max(self.walls[w].closing(pose, of(nodes.x), of(nodes.v), reach));
+            }
+        }
+        greatest
     }
 
     /// Corrects the free velocities of held nodes from `at` on; gives the work of what holds the booked ones.
