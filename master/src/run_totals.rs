@@ -4,7 +4,7 @@ use deck::model::Model;
 use mechanics::{
     contact::PairEnergies,
     mesh::Part,
-    rigid::{self, switch::Loss},
+    rigid::{self, switch::Formation},
     state::{GlobalState, field},
     vote::{PartVote, Vote},
     wall::WallVote,
@@ -271,10 +271,10 @@ impl RunTotals {
     }
 
     /// Books what a part lost as it became rigid, after the cycle booked last: work from outside that takes it.
-    pub fn book_formed(&mut self, loss: &Loss) {
-        self.external_ahead -= loss.kinetic;
-        if let Some(ahead) = self.external_ahead_of_parts.get_mut(loss.part as usize) {
-            *ahead -= loss.kinetic;
+    pub fn book_formation(&mut self, formation: &Formation) {
+        self.external_ahead -= formation.lost;
+        if let Some(ahead) = self.external_ahead_of_parts.get_mut(formation.part as usize) {
+            *ahead -= formation.lost;
         }
     }
 

@@ -10,7 +10,7 @@ use mechanics::{
     exact::Quantum,
     rigid::{
         State,
-        switch::{self, Formed},
+        switch::{self, Formed, Surroundings},
     },
     state::GlobalState,
     vote::Vote,
@@ -54,28 +54,45 @@ pub(super) struct Continuation {
 
 impl Checkpoint {
     /// Of the start of a run.
-    ///
-    /// # Errors
-    /// If a part that is rigid at first cannot be.
-    pub(super) fn first(problem: &Problem, mut start: GlobalState) -> Result<Self, Error> {
+    pub(super) fn first(problem: &Problem, start: GlobalState) -> Self {
         let model = &problem.model;
-        let (mut formed, mut bodies) = (Vec::new(), Vec::new());
-        bodies.extend(model.setup.bodies.iter().map(|body| body.start));
-        let walls = mechanics::wall::first_poses(&model.setup.walls);
-        let at = (&mut start, walls.as_slice());
-        switch::switch(&model.setup, &model.mesh, at, &mut formed, &mut bodies).map_err(Error::Problem)?;
         let continuation = Continuation {
             dt_previous: 0.0,
             dt: None,
             quanta: [problem.quanta.force; 2],
             vote: None,
-            walls,
-            formed,
+            walls: mechanics::wall::first_poses(&model.setup.walls),
+            formed: Vec::new(),
             run_totals: RunTotals::at_start(model, &start),
             n_rows: 0,
             spread_rate: 0.0,
         };
-        Ok(Self { state: Arc::new(start), continuation })
+        Self { state: Arc::new(start), continuation }
+    }
+
+    /// The same once the parts are rigid that are at its time, and the others deform; none where that is so already. It is as results
+    /// and the disk never have it: those have what the cycle before has left.
+    ///
+    /// # Errors
+    /// If a part cannot become rigid, or cannot deform again.
+    pub(super) fn switched(&self, problem: &Problem) -> Result<Option<Self>, String> {
+        let (setup, mesh) = (&problem.model.setup, &problem.model.mesh);
+        if !switch::is_due(&setup.switches, &self.continuation.formed, self.state.time) {
+            return Ok(None);
+        }
+        let mut state = GlobalState::clone(&self.state);
+        let mut continuation = self.continuation.clone();
+        let mut bodies = self.bodies(problem);
+        let about = Surroundings { setup, mesh, walls: &continuation.walls, dt: continuation.dt };
+        let outcome = switch::switch(&about, &mut state, &mut continuation.formed, &mut bodies)?;
+        outcome.formations.iter().for_each(|formation| continuation.run_totals.book_formation(formation));
+        if let Some(vote) = &mut continuation.vote {
+            vote.bodies = bodies;
+            vote.strike = vote.strike.max(outcome.strike);
+            vote.contact_speed_squared = vote.contact_speed_squared.max(outcome.speed * outcome.speed);
+            vote.contact_speed_ahead = vote.contact_speed_ahead.max(outcome.speed);
+        }
+        Ok(Some(Self { state: Arc::new(state), continuation }))
     }
 
     /// States of the rigid bodies, those that last first.
@@ -308,7 +325,7 @@ mod tests {
     fn checkpoint() -> Checkpoint {
         let model = deck::read(super::super::tests::DECK, "two cubes").expect("a good deck");
         let (problem, start) = Problem::new(Arc::new(model)).expect("a good problem");
-        Checkpoint::first(&problem, start).expect("nothing becomes rigid")
+        Checkpoint::first(&problem, start)
     }
 
     #[test]

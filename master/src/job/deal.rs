@@ -56,7 +56,7 @@ impl Job {
         }
         let (problem, start) = Problem::new(model)?;
         let (first, rows) = match resume {
-            None => (Checkpoint::first(&problem, start)?, Vec::new()),
+            None => (Checkpoint::first(&problem, start), Vec::new()),
             Some(snapshot) => Checkpoint::restored(snapshot, &problem, &start)?,
         };
         let keep = options.keep;
@@ -76,6 +76,7 @@ impl Job {
             options,
         };
         let mut actions = Vec::new();
+        job.switch_parts().map_err(Error::Problem)?;
         job.epoch = job.deal(0, (0..specs.len()).collect(), &mut actions)?;
         job.tally.sorts = u64::from(job.tally.census.units > 0);
         if let Some(seconds) = keep.seconds() {

@@ -1,12 +1,13 @@
 //! An epoch: from one dealing out of the problem to the next.
 //!
 //! An epoch begins at a [`Checkpoint`], the whole state at the start of a cycle, on a set of workers and with speeds for
-//! them. It ends with the job, or by one of two ways to the next:
+//! them. It ends with the job, or by one of three ways to the next:
 //!
 //! - *A worker is lost.* The run goes back to the newest checkpoint on those that are left: rows, totals and the schedule of
 //!   output are those of the checkpoint, and sinks are told to drop what lies behind it.
 //! - *A worker has joined, or speeds turned out to be others.* At the next plan boundary the workers stop at the start
 //!   of a cycle with their states and the last vote; that is the checkpoint of the next epoch, and nothing is lost.
+//! - *A part becomes rigid or deforms again.* Likewise, at the first cycle that starts in its time or after it.
 
 use std::sync::Arc;
 

@@ -20,6 +20,8 @@ struct Mover {
     velocity: Vec<(usize, Drive)>,
     /// Turns (radians per time), each with the longest arm from its axis (length).
     turns: Vec<(Drive, f64)>,
+    /// It may have begun after the vote was taken, though its motion was prescribed then.
+    begins_later: bool,
 }
 
 /// The prescribed motions of a problem with contact.
@@ -69,7 +71,8 @@ impl Foresight {
         let mut movers: Vec<Mover> = Vec::new();
         let of_switches = setup.switches.iter().map(|switch| {
             let reach = switch.reach(mesh);
-            Mover::of(&switch.velocity, switch.spin.iter().flatten().map(|&rate| (rate, reach)))
+            let turns = switch.spin.iter().flatten().map(|&rate| (rate, reach));
+            Mover { begins_later: true, ..Mover::of(&switch.velocity, turns) }
         });
         for mover in of_nodes.chain(of_bodies).chain(of_switches) {
             if mover.moves() && !movers.contains(&mover) {
@@ -93,6 +96,7 @@ impl Mover {
         Self {
             velocity: velocity.filter(|(_, drive)| drive.factor != 0.0).collect(),
             turns: turns.filter(|(rate, arm)| rate.factor * arm != 0.0).collect(),
+            begins_later: false,
         }
     }
 
@@ -108,7 +112,8 @@ impl Mover {
         let (mut own_turn, mut turn_change) = (0.0, 0.0);
         let of = |drive: &Drive| {
             let [low, high] = drive.range(curves, window.from, until).unwrap_or_default();
-            let known = window.known.and_then(|time| drive.prescribed(curves, time));
+            let known = window.known.filter(|_| !self.begins_later);
+            let known = known.and_then(|time| drive.prescribed(curves, time));
             let change = known.map_or(f64::INFINITY, |known| (high - known).abs().max((low - known).abs()));
             (low.abs().max(high.abs()), change)
         };

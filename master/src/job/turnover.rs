@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use mechanics::{rigid::switch, state::GlobalState, vote::Vote};
+use mechanics::{state::GlobalState, vote::Vote};
 use protocol::message::ToWorker;
 
 use super::{
     Job,
-    checkpoints::{Checkpoint, Continuation},
+    checkpoints::Checkpoint,
     error::Error,
     samples::Stopped,
     workers::Goes,
@@ -192,6 +192,12 @@ impl Job {
                 actions.push(Action::Freed(index));
             }
         }
+        if let Err(why) = self.switch_parts() {
+            self.account.failure = Some(why);
+            let state = GlobalState::clone(&self.checkpoints.newest().state);
+            self.end_with(state, actions);
+            return Ok(());
+        }
         self.next_epoch(actions)
     }
 
@@ -225,16 +231,22 @@ impl Job {
         Ok(())
     }
 
-    /// Where all have stopped is the newest checkpoint. Parts that are rigid for a time become so here, and end.
-    fn adopt(&mut self, mut state: GlobalState, mut vote: Vote) -> Result<(), Error> {
-        let model = &self.problem.model;
-        let mut formed = self.checkpoints.newest().continuation.formed.clone();
-        let at = (&mut state, self.account.walls.as_slice());
-        let losses = switch::switch(&model.setup, &model.mesh, at, &mut formed, &mut vote.bodies)
-            .map_err(Error::Problem)?;
-        losses.iter().for_each(|loss| self.account.run_totals.book_formed(loss));
-        let continuation = Continuation { formed, ..self.rest_at(state.cycle, vote)? };
+    /// Where all have stopped is the newest checkpoint.
+    fn adopt(&mut self, state: GlobalState, vote: Vote) -> Result<(), Error> {
+        let continuation = self.rest_at(state.cycle, vote)?;
         self.checkpoints.adopt(Arc::new(Checkpoint { state: Arc::new(state), continuation }));
+        Ok(())
+    }
+
+    /// Parts become rigid, or deform again, where the newest checkpoint is at their time: the next epoch begins with that.
+    ///
+    /// # Errors
+    /// If one cannot.
+    pub(super) fn switch_parts(&mut self) -> Result<(), String> {
+        if let Some(switched) = self.checkpoints.newest().switched(&self.problem)? {
+            self.account.run_totals = switched.continuation.run_totals.clone();
+            self.checkpoints.adopt(Arc::new(switched));
+        }
         Ok(())
     }
 

@@ -56,6 +56,9 @@ pub(super) fn joined(model: &Model) -> Vec<usize> {
             }
         }
     }
+    for switch in &model.setup.switches {
+        switch.parts.windows(2).for_each(|pair| join(&mut roots, pair[0] as usize, pair[1] as usize));
+    }
     for body in &model.setup.bodies {
         body.parts.windows(2).for_each(|pair| join(&mut roots, pair[0] as usize, pair[1] as usize));
         // What shares nodes with a rigid body is moved by it.

@@ -132,6 +132,24 @@ pub fn poses(
     }));
 }
 
+/// The greatest speed at which a node closes in on one of the walls that it feels, see [`RigidWall::closing`]: one bit of `felt` for each.
+pub fn closing(
+    walls: &[RigidWall],
+    poses: &[Pose],
+    mut felt: u32,
+    x: [f64; 3],
+    v: [f64; 3],
+    reach: f64,
+) -> f64 {
+    let mut greatest = 0.0_f64;
+    while felt != 0 {
+        let w = felt.trailing_zeros() as usize;
+        felt &= felt - 1;
+        greatest = greatest.max(walls[w].closing(&poses[w], x, v, reach));
+    }
+    greatest
+}
+
 /// What the nodes gave a wall or a support in one cycle, and its work: exact sums.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WallVote {

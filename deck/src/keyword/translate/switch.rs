@@ -66,6 +66,8 @@ impl Switched {
         }
         let mut spans: BTreeMap<u32, Vec<(Span, u32, Place)>> = BTreeMap::new();
         for (id, mut list) in events {
+            // Also a part that is rigid at no time at all is none that lasts.
+            spans.entry(id).or_default();
             list.sort_by(|a, b| a.time.total_cmp(&b.time));
             if matches!(
                 problem.materials.get(&problem.parts[&id].material.value).map(|m| &m.law),

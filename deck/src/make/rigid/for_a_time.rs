@@ -27,6 +27,7 @@ pub(in crate::make) fn make_for_a_time(
     for (index, draft @ RigidDraft { rigid, given }) in drafts.iter().enumerate() {
         let (at, title) = (rigid.at, &rigid.title);
         let whole = [
+            ("name", rigid.name.is_some()),
             ("nodes", rigid.nodes.is_some()),
             ("mass", rigid.mass.is_some()),
             ("inertia", rigid.inertia.is_some()),
@@ -53,7 +54,10 @@ pub(in crate::make) fn make_for_a_time(
                 at,
                 format!("{title} with node {}, which another rigid body has", id_of(shared)),
                 "bodies that share no nodes",
-                "take the part out of one of the two, or do not join them",
+                log.say(
+                    "take the part out of one of the two, or do not join them",
+                    "switch one of the two only",
+                ),
             );
             continue;
         }
@@ -72,7 +76,10 @@ pub(in crate::make) fn make_for_a_time(
                     other.rigid.title
                 ),
                 "bodies that share no nodes at one time",
-                "make them one [[rigid]], or do not join them",
+                log.say(
+                    "make them one [[rigid]], or do not join them",
+                    "switch them by the same cards, which joins them where they share nodes",
+                ),
             );
             continue;
         }
@@ -97,7 +104,7 @@ pub(in crate::make) fn make_for_a_time(
         let Some(held) = given_with_supports(&alone, &body, conditions, &without_walls) else {
             log.fault(
                 at,
-                format!("{title} with nodes that a boundary moves, or holds for a time"),
+                format!("{title} with nodes that a boundary moves, holds for a time, or holds beside the centre alone"),
                 "nodes that move freely, or supports that hold the body along or about axes all along",
                 "take them out of the boundary; velocity and spin of [[rigid]] move the body",
             );
@@ -105,7 +112,8 @@ pub(in crate::make) fn make_for_a_time(
         };
         // What leads the body acts while it is one, and begins with it as a jump.
         let within = |drives: [Option<Drive>; 3]| {
-            drives.map(|drive| drive.map(|drive| Drive { span: overlap(drive.span, rigid.span), ..drive }))
+            let begin = |span: Span| Span { from: span.from.max(rigid.span.from), ..span };
+            drives.map(|drive| drive.map(|drive| Drive { span: begin(drive.span), ..drive }))
         };
         switches.push(Switch {
             parts: given.parts.clone(),
@@ -115,10 +123,4 @@ pub(in crate::make) fn make_for_a_time(
         });
     }
     switches
-}
-
-/// The times that are in both.
-fn overlap(a: Span, b: Span) -> Span {
-    let from = a.from.max(b.from);
-    Span { from, until: a.until.min(b.until).max(from) }
 }

@@ -214,6 +214,9 @@ fn automatic_switches_make_parts_rigid_for_a_time() {
     let joined = format!("{}{}", at("2e-7", "2,0", "1,0\n2,1\n"), at("5e-7", "0,2", "1\n2\n"));
     assert_eq!(switches(&joined), [(vec![0, 1], SPAN)]);
     warned(&format!("{on}{on}"), "part 1 is rigid before already");
+    // Rigid at no time.
+    let never = good(&format!("{first}{}", at("0.0", "0,1", "1\n"))).setup;
+    assert!(never.switches.is_empty() && never.bodies.is_empty());
 }
 
 #[test]

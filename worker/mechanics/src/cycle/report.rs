@@ -59,10 +59,8 @@ impl Domain {
             for i in (0..block.nodes.len()).filter(|i| sets[i / SET].strikes >> (i % SET) & 1 == 1) {
                 let felt = constraints[usize::from(block.constraint[i])].walls;
                 let (x, v) = (block.x.each_ref().map(|x| x[i]), block.v.each_ref().map(|v| v[i]));
-                for w in (0..walls.len()).filter(|w| felt >> w & 1 == 1) {
-                    let closing = walls[w].closing(&self.poses[w], x, v, f64::INFINITY);
-                    booked.closing = booked.closing.max(closing);
-                }
+                let closing = wall::closing(walls, &self.poses, felt, x, v, f64::INFINITY);
+                booked.closing = booked.closing.max(closing);
             }
         }
     }

@@ -4,7 +4,7 @@ use super::{Advance, NodeSet, Nodes};
 use crate::{
     element::vector::Vector,
     lanes::{Lane, SET},
-    wall::{Motion, Pose, WallVote, touched_quantum},
+    wall::{self, Motion, Pose, WallVote, touched_quantum},
     work::Work,
 };
 
@@ -38,31 +38,47 @@ impl Advance<'_> {
             return [held, 0];
         }
         let times = [self.dt, FORESEEN * self.dt];
-        let [mut clear, mut far] = [L::mask(u32::MAX); 2];
+        let (mut clear, mut near) = (L::mask(u32::MAX), 0);
         while walls != 0 {
             let w = walls.trailing_zeros() as usize;
-            let [now, soon] = self.walls[w].clear(&self.poses[w], x, v, times);
-            (clear, far) = (L::both(clear, now), L::both(far, soon));
             walls &= walls - 1;
+            let [now, later] = self.walls[w].clear(&self.poses[w], x, v, times);
+            clear = L::both(clear, now);
+            if set.strikes != 0 {
+                let soon = set.strikes & !(L::bits(later) as u8);
+                if soon != 0 {
+                    near |= self.feeling(nodes, soon, at, w);
+                }
+            }
         }
-        [kept | held & !(L::bits(clear) as u8), set.strikes & !(L::bits(far) as u8)]
+        [kept | held & !(L::bits(clear) as u8), near]
+    }
+
+    /// Those of these nodes from `at` on that feel a wall: what is far from another one must not decide with it.
+    #[cold]
+    fn feeling(&self, nodes: &Nodes<'_>, mut of: u8, at: usize, wall: usize) -> u8 {
+        let mut feeling = 0;
+        while of != 0 {
+            let lane = of.trailing_zeros();
+            of &= of - 1;
+            let walls = self.constraints[usize::from(nodes.constraint[at + lane as usize])].walls;
+            feeling |= ((walls >> wall & 1) as u8) << lane;
+        }
+        feeling
     }
 
     /// The greatest speed at which one of these nodes from `at` on closes in on a wall that it may strike soon. It is that before the step: a
     /// node that rests on a wall has none against it, however hard it is pressed.
+    #[cold]
     pub(super) fn closing(&self, nodes: &Nodes<'_>, mut near: u8, at: usize) -> f64 {
         let mut greatest = 0.0_f64;
         while near != 0 {
             let i = at + near.trailing_zeros() as usize;
             near &= near - 1;
             let of = |along: &[Vec<f64>; 3]| std::array::from_fn(|a| along[a][i]);
-            let mut walls = self.constraints[usize::from(nodes.constraint[i])].walls;
-            while walls != 0 {
-                let w = walls.trailing_zeros() as usize;
-                walls &= walls - 1;
-                let (pose, reach) = (&self.poses[w], FORESEEN * self.dt);
-                greatest = greatest.max(self.walls[w].closing(pose, of(nodes.x), of(nodes.v), reach));
-            }
+            let felt = self.constraints[usize::from(nodes.constraint[i])].walls;
+            let (x, v) = (of(nodes.x), of(nodes.v));
+            greatest = greatest.max(wall::closing(self.walls, self.poses, felt, x, v, FORESEEN * self.dt));
         }
         greatest
     }

@@ -160,7 +160,7 @@ fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
     let mut vectors = |size: f64| -> [Vec<f64>; 3] { [0; 3].map(|_| numbers(padded, -size, size)) };
     let (x, v, f, reference) = (vectors(1e-3), vectors(10.0), vectors(1e4), vectors(1e-3));
     let mass = numbers(padded, 1.0, 2.0);
-    let constraint: Vec<u16> = (0..n as u16).map(|i| [0, 0, 1, 0, 2][i as usize % 5]).collect();
+    let constraint: Vec<u16> = (0..n as u16).map(|i| [0, 3, 1, 0, 2][i as usize % 5]).collect();
     let mut sets = NodeSet::all(&constraint);
     for (i, set) in (0..n).map(|i| (i, i / SET)).filter(|(i, _)| i % 3 != 1) {
         sets[set].booked |= 1 << (i % SET);
@@ -177,9 +177,13 @@ fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
             ..Constraint::default()
         },
         Constraint { walls: 1, forces: 1, ..Constraint::default() },
+        Constraint { walls: 2, ..Constraint::default() },
     ];
     let motion = Motion::Free { mass: 50.0, velocity: [0.0; 3] };
     let wall = RigidWall { shape: FLOOR, motion, friction: 0.2, parts: vec![true] };
+    // Felt by none but neighbours of those that feel the floor.
+    let beside = Shape::Plane { point: [-1e-4, 0.0, 0.0], normal: [1.0, 0.0, 0.0] };
+    let beside = RigidWall { shape: beside, motion: Motion::Fixed, friction: 0.0, parts: vec![true] };
     let loads = Loads {
         forces: vec![NodalForce { force: [1e3, 0.0, 5e2], by_mass: false, drive: Drive::constant(1.0) }],
         gravity: Some(Gravity { acceleration: [0.0, 3.0, -10.0], drive: Drive::constant(1.0) }),
@@ -191,14 +195,14 @@ fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
         dt: 1.1e-4,
         time: 0.0,
         constraints: &constraints,
-        walls: &[wall],
-        poses: &[Pose::default()],
+        walls: &[wall, beside],
+        poses: &[Pose::default(); 2],
         loads: &loads,
         quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
     };
     let run = |width: Width| {
         let (mut x, mut v, mut f) = (x.clone(), v.clone(), f.clone());
-        let mut votes = [WallVote::default()];
+        let mut votes = [WallVote::default(); 2];
         let mut nodes = Nodes {
             x: &mut x,
             v: &mut v,

@@ -42,15 +42,16 @@ pub struct Switch {
 }
 
 impl Switch {
-    /// The longest distance of a node from the middle of the nodes, as the deck has them (length).
+    /// No node of it is farther from its centre: the diagonal of the box around it, as the deck has it (length).
     pub fn reach(&self, mesh: &Mesh) -> f64 {
-        let places = || {
-            let nodes = self.parts.iter().flat_map(|&p| &mesh.parts[p as usize].nodes);
-            nodes.map(|&n| mesh.positions[n as usize])
-        };
-        let n = places().count().max(1) as f64;
-        let middle: [f64; 3] = std::array::from_fn(|a| places().map(|x| x[a]).sum::<f64>() / n);
-        places().map(|x| minus(x, middle)).map(|arm| dot(arm, arm)).fold(0.0, f64::max).sqrt()
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for &n in self.parts.iter().flat_map(|&p| &mesh.parts[p as usize].nodes) {
+            for (a, x) in mesh.positions[n as usize].into_iter().enumerate() {
+                (low[a], high[a]) = (low[a].min(x), high[a].max(x));
+            }
+        }
+        let diagonal = minus(high, low);
+        dot(diagonal, diagonal).sqrt()
     }
 }
 
@@ -65,12 +66,38 @@ pub struct Formed {
     pub constraint: Vec<u16>,
 }
 
-/// Kinetic energy that a part lost as a body formed.
+/// A body has formed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Loss {
+pub struct Formation {
+    /// The part that books it.
     pub part: u32,
-    pub kinetic: f64,
+    /// Kinetic energy that its nodes lost.
+    pub lost: f64,
 }
+
+/// What bodies form and end in.
+#[derive(Clone, Copy)]
+pub struct Surroundings<'a> {
+    pub setup: &'a Setup,
+    pub mesh: &'a Mesh,
+    /// Poses of the walls of finite mass.
+    pub walls: &'a [Pose],
+    /// The time step to come (time); none at the start of a run.
+    pub dt: Option<f64>,
+}
+
+/// What a switch did, as far as the last vote does not know it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outcome {
+    pub formations: Vec<Formation>,
+    /// Of nodes that are no body's any more, see [`Vote::strike`](crate::vote::Vote::strike).
+    pub strike: f64,
+    /// Greatest speed of a node of a body that formed.
+    pub speed: f64,
+}
+
+/// Steps within which a node that is let go may strike a wall before votes know of it.
+const FORESEEN: f64 = 3.0;
 
 /// Whether bodies are to form or to end before the cycle that starts at a time.
 pub fn is_due(switches: &[Switch], formed: &[Formed], time: f64) -> bool {
@@ -86,36 +113,42 @@ pub fn with_formed(setup: &Setup, formed: &[Formed]) -> Setup {
 }
 
 /// Forms and ends the bodies that are due in a state: `formed` are those so far, in the order of the switches, and `bodies` the states
-/// of all bodies. Gives what was lost.
+/// of all bodies.
 ///
 /// # Errors
-/// If the nodes of a part have no inertia, or a part is to deform again where a wall is, which stands as `walls` say.
+/// If the nodes of a part have no inertia, a part is to deform again where a wall is, or there are states of other bodies than these.
 pub fn switch(
-    setup: &Setup,
-    mesh: &Mesh,
-    (state, walls): (&mut GlobalState, &[Pose]),
+    about: &Surroundings<'_>,
+    state: &mut GlobalState,
     formed: &mut Vec<Formed>,
     bodies: &mut Vec<State>,
-) -> Result<Vec<Loss>, String> {
-    let mut losses = Vec::new();
-    if !is_due(&setup.switches, formed, state.time) {
-        return Ok(losses);
+) -> Result<Outcome, String> {
+    let setup = about.setup;
+    let lasting = setup.bodies.len();
+    if bodies.len() != lasting + formed.len() {
+        let expected = lasting + formed.len();
+        return Err(format!("a vote with the states of {} rigid bodies, expected {expected}", bodies.len()));
     }
-    let moving = bodies.split_off(setup.bodies.len());
-    let before: Vec<(Formed, State)> = std::mem::take(formed).into_iter().zip(moving).collect();
-    // Constraints come back first: nodes may go from one body to another.
+    let moving = bodies.split_off(lasting);
+    let before = std::mem::take(formed).into_iter().zip(moving);
     let stays = |formed: &Formed| setup.switches[formed.switch as usize].span.holds(state.time);
-    let (stay, end): (Vec<_>, Vec<_>) = before.into_iter().partition(|(formed, _)| stays(formed));
-    for (formed, _) in &end {
-        release(setup, mesh, (state, walls), formed)?;
+    let (stay, end): (Vec<(Formed, State)>, Vec<_>) = before.partition(|(formed, _)| stays(formed));
+    // Constraints come back first: nodes may go from one body to another.
+    for (Formed { body, constraint, .. }, _) in &end {
+        for (&node, &constraint) in body.nodes.iter().zip(constraint) {
+            state.constraint[node as usize] = constraint;
+        }
     }
-    let mut before = stay.into_iter().peekable();
+    let mut outcome = Outcome::default();
+    let mut stay = stay.into_iter().peekable();
     for (index, switch) in (0..).zip(&setup.switches) {
-        let (body, motion) = match before.next_if(|(formed, _)| formed.switch == index) {
+        let (body, motion) = match stay.next_if(|(formed, _)| formed.switch == index) {
             Some(stays) => stays,
             None if switch.span.holds(state.time) => {
-                let (body, kinetic) = form(setup, mesh, state, (index, switch))?;
-                losses.push(Loss { part: switch.parts[0], kinetic });
+                let (body, lost) = form(about, state, (index, switch))?;
+                outcome.formations.push(Formation { part: switch.parts[0], lost });
+                let speeds = body.body.nodes.iter().map(|&n| state.v[n as usize]).map(|v| dot(v, v));
+                outcome.speed = outcome.speed.max(speeds.fold(0.0, f64::max).sqrt());
                 let motion = body.body.start;
                 (body, motion)
             }
@@ -124,29 +157,37 @@ pub fn switch(
         formed.push(body);
         bodies.push(motion);
     }
-    Ok(losses)
+    for (ended, _) in &end {
+        let is_free = |node: &u32| formed.iter().all(|now| now.body.nodes.binary_search(node).is_err());
+        let free: Vec<u32> = ended.body.nodes.iter().copied().filter(is_free).collect();
+        outcome.strike = outcome.strike.max(release(about, state, ended.switch, &free)?);
+    }
+    Ok(outcome)
 }
 
-/// Lets nodes move each for itself again, under what holds them.
-fn release(
-    setup: &Setup,
-    mesh: &Mesh,
-    (state, walls): (&mut GlobalState, &[Pose]),
-    formed: &Formed,
-) -> Result<(), String> {
+/// Looks at nodes that move each for itself again, where walls are that they feel: gives the share of the speed of sound at which one of
+/// them will strike.
+fn release(about: &Surroundings<'_>, state: &GlobalState, switch: u32, nodes: &[u32]) -> Result<f64, String> {
+    let Surroundings { setup, mesh, walls, dt } = *about;
+    let parts = || setup.switches[switch as usize].parts.iter().map(|&p| &mesh.parts[p as usize]);
+    let slowest = parts().map(|part| setup.materials[part.material as usize].sound_speed());
+    let slowest = slowest.fold(f64::INFINITY, f64::min);
+    let extent = nodes.iter().map(|&n| minus(state.x[n as usize], state.x[nodes[0] as usize]));
+    let extent = extent.flatten().fold(0.0_f64, |extent, c| extent.max(c.abs()));
     let mut poses = Vec::new();
     wall::poses(&setup.walls, &setup.loads.curves, state.time, 0.0, walls, &mut poses);
-    let reach = formed.body.places.iter().flatten().fold(0.0_f64, |reach, c| reach.max(c.abs()));
-    for (&node, &constraint) in formed.body.nodes.iter().zip(&formed.constraint) {
-        state.constraint[node as usize] = constraint;
-        let felt = setup.constraints[usize::from(constraint)].walls;
+    let mut closing = 0.0_f64;
+    for &node in nodes {
+        let (x, v) = (state.x[node as usize], state.v[node as usize]);
+        let felt = setup.constraints[usize::from(state.constraint[node as usize])].walls;
+        closing =
+            closing.max(wall::closing(&setup.walls, &poses, felt, x, v, FORESEEN * dt.unwrap_or_default()));
         for w in (0..setup.walls.len()).filter(|w| felt >> w & 1 == 1) {
-            let x = minus(state.x[node as usize], poses[w][0]);
-            let (height, _) = setup.walls[w].shape.height(x);
-            if height < -INSIDE * reach {
+            let (height, _) = setup.walls[w].shape.height(minus(x, poses[w][0]));
+            if height < -INSIDE * extent {
                 return Err(format!(
                     "part `{}` is to deform again from {:e} on; its node {} is then {:e} inside [[wall]] {}, which does not stop it while it is rigid: let it deform earlier",
-                    mesh.parts[formed.body.account as usize].name,
+                    parts().next().map_or("", |part| part.name.as_str()),
                     state.time,
                     mesh.node_ids[node as usize],
                     -height,
@@ -155,31 +196,39 @@ fn release(
             }
         }
     }
-    Ok(())
+    Ok(closing / slowest)
 }
 
-/// Makes one body of nodes as they are; gives it, and the kinetic energy that its nodes lose.
+/// Makes one body of nodes as they are; gives it, and the kinetic energy that its nodes lose. Where no element is left it has no nodes.
 fn form(
-    setup: &Setup,
-    mesh: &Mesh,
+    about: &Surroundings<'_>,
     state: &mut GlobalState,
     (index, switch): (u32, &Switch),
 ) -> Result<(Formed, f64), String> {
+    let Surroundings { setup, mesh, .. } = *about;
     let nodes = living_nodes(mesh, state, &switch.parts);
-    let name = || mesh.parts[switch.parts[0] as usize].name.clone();
+    let body = Body {
+        parts: Vec::new(),
+        account: switch.parts[0],
+        mass: 1.0,
+        inertia: [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+        velocity: switch.velocity,
+        spin: switch.spin,
+        circle: None,
+        start: starting(&[0.0; 6], [0.0; 3], [0.0; 3], [0.0; 3]),
+        nodes: Vec::new(),
+        places: Vec::new(),
+        nodal_scale: 1.0,
+        length: Quantum::for_reference(1.0, 50),
+        courant: None,
+        forces: Vec::new(),
+        pulls: Vec::new(),
+    };
     let Some(&first) = nodes.first() else {
-        return Err(format!(
-            "part `{}` is to be rigid from {:e} on; no element of it is left",
-            name(),
-            state.time
-        ));
+        return Ok((Formed { switch: index, body, constraint: Vec::new() }, 0.0));
     };
     let first = state.x[first as usize];
     let from_first = |n: u32| minus(state.x[n as usize], first);
-    let turning = |n: u32| {
-        let inertia = state.shells.inertia.get(n as usize).copied().unwrap_or_default();
-        (inertia, if inertia > 0.0 { state.shells.spin[n as usize] } else { [0.0; 3] })
-    };
     let mut all = Moments::default();
     nodes.iter().for_each(|&n| all.add(state.mass[n as usize], from_first(n)));
     let (centre, mut inertia) = all.central();
@@ -187,7 +236,9 @@ fn form(
     let (mut momentum, mut angular, mut kinetic) = ([0.0; 3], [0.0; 3], 0.0);
     for (&n, &place) in nodes.iter().zip(&places) {
         let (mass, v) = (state.mass[n as usize], state.v[n as usize]);
-        let (own, spin) = turning(n);
+        // Nodes of shells and beams turn by themselves.
+        let own = state.shells.inertia.get(n as usize).copied().unwrap_or_default();
+        let spin = if own > 0.0 { state.shells.spin[n as usize] } else { [0.0; 3] };
         let moment = cross(place, v);
         for a in 0..3 {
             momentum[a] += mass * v[a];
@@ -200,8 +251,7 @@ fn form(
     if !is_positive(&inertia) {
         return Err(format!(
             "part `{}` is to be rigid from {:e} on; the inertia of its nodes is {inertia:?}, it must be positive",
-            name(),
-            state.time
+            mesh.parts[switch.parts[0] as usize].name, state.time
         ));
     }
     let speed = momentum.map(|p| p / all.mass);
@@ -213,31 +263,17 @@ fn form(
     let constraints = (setup.constraints.as_slice(), constraint.as_slice());
     let (forces, pulls) = forces_on(constraints, &setup.loads, &places, &mass_of, [all.mass; 2]);
     for (&n, &place) in nodes.iter().zip(&places) {
+        let n = n as usize;
         let turned = cross(spin, place);
-        state.v[n as usize] = std::array::from_fn(|a| speed[a] + turned[a]);
-        if state.shells.inertia.get(n as usize).is_some_and(|inertia| *inertia > 0.0) {
-            state.shells.spin[n as usize] = spin;
+        state.v[n] = std::array::from_fn(|a| speed[a] + turned[a]);
+        if state.shells.inertia.get(n).is_some_and(|inertia| *inertia > 0.0) {
+            state.shells.spin[n] = spin;
         }
-        state.constraint[n as usize] = 0;
+        state.constraint[n] = 0;
     }
     let radius = places.iter().flatten().fold(0.0_f64, |r, c| r.max(c.abs()));
-    let body = Body {
-        parts: Vec::new(),
-        account: switch.parts[0],
-        mass: all.mass,
-        inertia,
-        velocity: switch.velocity,
-        spin: switch.spin,
-        circle: None,
-        start,
-        nodes,
-        places,
-        nodal_scale: 1.0,
-        length: Quantum::for_reference(2.0 * radius, 50),
-        courant: None,
-        forces,
-        pulls,
-    };
+    let length = Quantum::for_reference(2.0 * radius, 50);
+    let body = Body { mass: all.mass, inertia, start, nodes, places, length, forces, pulls, ..body };
     let kept = 0.5 * all.mass.mul_add(dot(speed, speed), dot(spin, start.momentum));
     Ok((Formed { switch: index, body, constraint }, kinetic - kept))
 }
