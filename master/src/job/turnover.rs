@@ -5,13 +5,7 @@ use std::sync::Arc;
 use mechanics::{state::GlobalState, vote::Vote};
 use protocol::message::ToWorker;
 
-use super::{
-    Job,
-    checkpoints::Checkpoint,
-    error::Error,
-    samples::Stopped,
-    workers::Goes,
-};
+use super::{Job, checkpoints::Checkpoint, error::Error, samples::Stopped, workers::Goes};
 use crate::{
     event::{Action, WorkerSpec},
     incident::Loss,
