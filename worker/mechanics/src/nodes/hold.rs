@@ -42,13 +42,17 @@ impl Advance<'_> {
         while walls != 0 {
             let w = walls.trailing_zeros() as usize;
             walls &= walls - 1;
+            // Without nodes that strike, what is later is not computed.
+            if set.strikes == 0 {
+                let [now, _] = self.walls[w].clear(&self.poses[w], x, v, times);
+                clear = L::both(clear, now);
+                continue;
+            }
             let [now, later] = self.walls[w].clear(&self.poses[w], x, v, times);
             clear = L::both(clear, now);
-            if set.strikes != 0 {
-                let soon = set.strikes & !(L::bits(later) as u8);
-                if soon != 0 {
-                    near |= self.feeling(nodes, soon, at, w);
-                }
+            let soon = set.strikes & !(L::bits(later) as u8);
+            if soon != 0 {
+                near |= self.feeling(nodes, soon, at, w);
             }
         }
         [kept | held & !(L::bits(clear) as u8), near]
