@@ -262,12 +262,15 @@ const WHOLE: u64 = 1_000_000;
 
 /// Every deck of `deck/examples`, the cycle at which its run ends, and what has happened by then. An explosive burns from the
 /// first cycle on.
-const EXAMPLES: [(&str, u64, Event); 26] = [
+const EXAMPLES: [(&str, u64, Event); 29] = [
     ("aramid-panel.toml", 1500, Event::Contact),
     ("ball-on-shell.k", WHOLE, Event::Contact),
     ("ball-tears-sheet.toml", 400, Event::Erosion),
     ("bar-on-wall.k", WHOLE, Event::None),
+    ("blast-on-plate.toml", WHOLE, Event::None),
     ("block-on-plate.k", WHOLE, Event::Contact),
+    ("bolted-joint.toml", WHOLE, Event::Erosion),
+    ("ceramic-tile.toml", WHOLE, Event::Erosion),
     ("composite-panel.toml", 600, Event::Erosion),
     ("concrete-crater.toml", 800, Event::Contact),
     ("explosive-on-plate.toml", WHOLE, Event::Contact),
