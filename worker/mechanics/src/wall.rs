@@ -174,6 +174,9 @@ impl WallVote {
     }
 }
 
+/// Steps within which a strike is foreseen. A vote takes effect two steps after its own, and each may be twice as long as the one before.
+pub const FORESEEN: f64 = 3.0;
+
 /// Most of a wall's mass that nodes which touch it may have: past all of it they would shake it ever more.
 pub const TOUCHED_SHARE: f64 = 0.5;
 

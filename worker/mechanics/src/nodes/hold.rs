@@ -8,9 +8,6 @@ use crate::{
     work::Work,
 };
 
-/// Steps within which a strike is foreseen. A vote takes effect two steps after its own, and each may be twice as long as the one before.
-const FORESEEN: f64 = 3.0;
-
 impl Advance<'_> {
     /// Those of the held nodes from `at` on that [`Advance::hold`] must see: not those that feel only walls and are clear
     /// of them in this step, which most are. And those of `set.strikes` that may strike a wall soon. `v` are the free velocities.
@@ -37,7 +34,7 @@ impl Advance<'_> {
         if walls == 0 || (kept == held && set.strikes == 0) {
             return [held, 0];
         }
-        let times = [self.dt, FORESEEN * self.dt];
+        let times = [self.dt, wall::FORESEEN * self.dt];
         let (mut clear, mut near) = (L::mask(u32::MAX), 0);
         while walls != 0 {
             let w = walls.trailing_zeros() as usize;
@@ -82,7 +79,8 @@ impl Advance<'_> {
             let of = |along: &[Vec<f64>; 3]| std::array::from_fn(|a| along[a][i]);
             let felt = self.constraints[usize::from(nodes.constraint[i])].walls;
             let (x, v) = (of(nodes.x), of(nodes.v));
-            greatest = greatest.max(wall::closing(self.walls, self.poses, felt, x, v, FORESEEN * self.dt));
+            greatest =
+                greatest.max(wall::closing(self.walls, self.poses, felt, x, v, wall::FORESEEN * self.dt));
         }
         greatest
     }

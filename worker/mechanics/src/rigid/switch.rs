@@ -96,9 +96,6 @@ pub struct Outcome {
     pub speed: f64,
 }
 
-/// Steps within which a node that is let go may strike a wall before votes know of it.
-const FORESEEN: f64 = 3.0;
-
 /// Whether bodies are to form or to end before the cycle that starts at a time.
 pub fn is_due(switches: &[Switch], formed: &[Formed], time: f64) -> bool {
     let has_formed = |index: u32| formed.iter().any(|formed| formed.switch == index);
@@ -180,8 +177,14 @@ fn release(about: &Surroundings<'_>, state: &GlobalState, switch: u32, nodes: &[
     for &node in nodes {
         let (x, v) = (state.x[node as usize], state.v[node as usize]);
         let felt = setup.constraints[usize::from(state.constraint[node as usize])].walls;
-        closing =
-            closing.max(wall::closing(&setup.walls, &poses, felt, x, v, FORESEEN * dt.unwrap_or_default()));
+        closing = closing.max(wall::closing(
+            &setup.walls,
+            &poses,
+            felt,
+            x,
+            v,
+            wall::FORESEEN * dt.unwrap_or_default(),
+        ));
         for w in (0..setup.walls.len()).filter(|w| felt >> w & 1 == 1) {
             let (height, _) = setup.walls[w].shape.height(minus(x, poses[w][0]));
             if height < -INSIDE * extent {
