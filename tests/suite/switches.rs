@@ -104,11 +104,8 @@ fn a_part_that_deforms_again_has_the_stress_it_had_turned_with_it() {
     };
     let (a, b) = (axis(&formed), axis(&turned));
     let cosine = (0..3).map(|i| a[i] * b[i]).sum::<f64>() / size(a) / size(b);
-    println!(
-        "turned by {:.1} degrees, stress changed by {worst:.2e} of {greatest:.2e}",
-        cosine.acos().to_degrees()
-    );
-    assert!(cosine.acos().to_degrees() > 20.0, "it has turned");
+    println!("cosine of its turn {cosine:.3}, stress changed by {worst:.2e} of {greatest:.2e}");
+    assert!(cosine < 0.94, "it has turned by 20 degrees and more: {cosine}");
     assert!(worst < 1e-3 * greatest, "{worst} of {greatest}");
     // What it does from then on takes no energy from nowhere.
     let free = run(struck(4100.0, &spinning));

@@ -178,7 +178,7 @@ pub(super) fn make(
         };
         let mut made = make(given.clone());
         if let (Some(id), Ok(body)) = (first_held, &made) {
-            let Some(held) = given_with_supports(&given, body, conditions, &Constraint::clone) else {
+            let Some(held) = given_with_supports(given, body, conditions, &Constraint::clone) else {
                 log.fault(
                     at,
                     format!("{title} with node {id}, which a boundary or a wall holds"),

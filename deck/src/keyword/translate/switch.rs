@@ -18,6 +18,9 @@ pub(super) struct Switched {
     spans: BTreeMap<u32, Vec<(Span, u32, Place)>>,
 }
 
+/// Parts that switch at the same times, with the part whose body each joins and where that is said.
+type Joining = BTreeMap<u32, (u32, Place)>;
+
 /// What happens to a part at a time.
 struct Event {
     time: f64,
@@ -117,12 +120,12 @@ impl Switched {
 
 /// Adds them to the deck: parts that switch at the same times are one body where a card joins them or they share nodes.
 pub(super) fn write(t: &mut Translation<'_>) {
-    let mut at_once: Vec<(Span, BTreeMap<u32, (u32, Place)>)> = Vec::new();
+    let mut at_once: Vec<(Span, Joining)> = Vec::new();
     for (&id, list) in &t.switched.spans {
         for &(span, lead, at) in list {
             match at_once.iter_mut().find(|(other, _)| *other == span) {
                 Some((_, parts)) => _ = parts.insert(id, (lead, at)),
-                None => at_once.push((span, BTreeMap::from([(id, (lead, at))]))),
+                None => at_once.push((span, Joining::from([(id, (lead, at))]))),
             }
         }
     }
@@ -149,7 +152,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
 }
 
 /// The bodies of parts that switch at the same times, each with the parts whose bodies they join.
-fn bodies_of(t: &Translation<'_>, parts: &BTreeMap<u32, (u32, Place)>) -> Vec<(Place, Vec<u32>)> {
+fn bodies_of(t: &Translation<'_>, parts: &Joining) -> Vec<(Place, Vec<u32>)> {
     let mut lead: BTreeMap<u32, u32> = parts.keys().map(|&id| (id, id)).collect();
     let join = |lead: &mut BTreeMap<u32, u32>, a: u32, b: u32| {
         let (to, from) = (lead[&a].min(lead[&b]), lead[&a].max(lead[&b]));
