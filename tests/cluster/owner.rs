@@ -66,7 +66,8 @@ fn a_worker_leaves_its_job_when_somebody_types_and_comes_back_later() {
     cluster.kill_worker("rack");
     let flags = ["--yield-to-owner=0.25", "--owner-load", "1000", "--owner-quiet", "1"];
     cluster.worker_with("sofa", "1", &flags);
-    cluster.json(&["submit", "--cycles", LONG, "--no-output", &small()]);
+    // It outlasts the steps of eight seconds, and is cancelled.
+    cluster.json(&["submit", "--cycles", "1000000", "--no-output", &small()]);
     cluster.wait_until_running(2);
     wait_for_end_of_step();
     let note = || standing(&cluster, "sofa").1;
