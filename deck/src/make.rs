@@ -64,7 +64,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let mut assembly = assembly::assemble(&parts, &joins, &materials, meshes, log)?;
     log.wanted()?;
     let curves = Curves::of(&deck.curves, log);
-    let (rigid, rigid_for_a_time) = rigid::drafts(&deck.rigid, &names, &curves, &assembly, log);
+    let (rigid, switched) = rigid::drafts(&deck.rigid, &names, &curves, &assembly, log);
     let clamps = clamp::boundaries(&deck.parts, &parts, log);
     let intended: Vec<_> = symmetry::boundaries(deck).chain(clamps).collect();
     let supports: Vec<_> = deck.boundaries.iter().chain(&intended).collect();
@@ -72,8 +72,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     assembly.mesh.lumped = load::lumped(deck, &names, &parts, &assembly, log);
     log.wanted()?;
     let bodies = rigid::make(&rigid, &materials, &mut assembly, &mut conditions, log);
-    let switches =
-        rigid::make_for_a_time(&rigid_for_a_time, &bodies, &materials, &assembly, &conditions, log);
+    let switches = rigid::make_switches(&switched, &bodies, &materials, &assembly, &conditions, log);
     let joints = joint::make(&deck.joints, &rigid, &bodies, &assembly, log);
     let contact = deck.contact.as_ref().and_then(|contact| {
         contact::make(contact, &names, &mut assembly, &materials, &conditions, &rigid, log)

@@ -34,10 +34,10 @@ mod workers;
 use std::sync::Arc;
 
 use deck::model::Model;
-use mechanics::{contact::Surface, digest, rigid::switch, state::GlobalState, vote::Vote};
+use mechanics::{contact::Surface, digest, state::GlobalState, vote::Vote};
 use protocol::{
     message::{Orders, ToMaster, ToWorker, WORKER_STATE_VERSION},
-    options::{Balance, Route},
+    options::Route,
 };
 
 use crate::{
@@ -46,7 +46,7 @@ use crate::{
     results::{history::HistoryRow, surface::Probe},
     sort::{Gathered, Sorted},
 };
-use balancing::{Balancing, Ground};
+use balancing::Balancing;
 use checkpoints::Checkpoints;
 use epoch::Epoch;
 use error::Breach;
@@ -422,36 +422,6 @@ impl Job {
     fn is_boundary(&self, cycle: u64) -> bool {
         let interval = self.model().setup.control.plan_interval.max(1);
         cycle.is_multiple_of(u64::from(interval)) || self.epoch.sorts.change_plan_at(cycle)
-    }
-
-    /// Whether the epoch is to end at a cycle: at once for processes that are to end, at a boundary for all others.
-    fn wants_next_epoch(&mut self, cycle: u64) -> bool {
-        let at_work = &self.epoch.at_work;
-        cycle > self.epoch.schedule.first_cycle()
-            && (self.workers.has_leavers(at_work, Goes::Ends)
-                || (self.is_boundary(cycle)
-                    && (self.workers.has_newcomers(at_work)
-                        || self.workers.has_leavers(at_work, Goes::Needed)
-                        || self.wants_other_speeds(cycle))))
-    }
-
-    /// Whether parts are to become rigid, or to deform again, before the cycle that begins at a time.
-    fn switches_at(&self, time: f64) -> bool {
-        let formed = &self.checkpoints.newest().continuation.formed;
-        switch::is_due(&self.model().setup.switches, formed, time)
-    }
-
-    /// Whether the epoch is to end for other speeds.
-    fn wants_other_speeds(&mut self, boundary: u64) -> bool {
-        if self.options.asked.balance == Balance::Given || self.epoch.n() < 2 {
-            return false;
-        }
-        let Some(medians) = self.epoch.meter.medians() else { return false };
-        let alive = self.epoch.sorts.eroded().map(crate::erosion::Eroded::alive);
-        let (model, node) = (&self.problem.model, self.options.costs.node);
-        let ground = Ground { mesh: &model.mesh, node, alive: alive.as_deref() };
-        let interval = u64::from(model.setup.control.plan_interval);
-        self.balancing.look((boundary, interval), &medians, &self.epoch.shares, &ground)
     }
 
     /// Whether the state at the start of a cycle is to be kept, to go back to.

@@ -21,6 +21,7 @@ use deck::Model;
 use master::{
     embedded::Fate,
     options::{CheckpointEvery, SessionOptions},
+    snapshot::file,
 };
 use protocol::options::{JobOptions, Route};
 
@@ -86,6 +87,23 @@ pub(crate) fn same_bits(model: &Model) {
         let options = without_states(JobOptions { sort_seed: Some(5), ..JobOptions::default() });
         let at_work = Workers { resume: Some(snapshot.clone()), ..asked(workers, options) };
         one.assert_equal(&fingerprint(model, at_work), &format!("restored on {workers} workers"));
+    }
+}
+
+/// Goes on with a run from snapshots of these cycles, each written to a file and read from it.
+pub(crate) fn same_bits_from_files(model: &Model, cycles: &[u64]) {
+    let one = fingerprint(model, Workers::default());
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("snapshot.bolide");
+    for &cycle in cycles {
+        let options = without_states(JobOptions { snapshot_at: Some(cycle), ..JobOptions::default() });
+        let taken = solve(model.clone(), asked(2, options)).unwrap_or_else(|e| panic!("{e}"));
+        file::write(&path, &taken.snapshot.expect("a snapshot was asked for")).expect("a disk with room");
+        for workers in [1, 3, 5] {
+            let resume = Some(file::read(&path).expect("a whole file"));
+            let found = fingerprint(model, Workers { resume, ..Workers::of(workers) });
+            one.assert_equal(&found, &format!("from cycle {cycle} on {workers} workers"));
+        }
     }
 }
 

@@ -1,15 +1,15 @@
 //! Rigid bodies of shells: the same bits on any workers, what is joined to them feels them as it should, nothing is lost.
 
 use deck::Model;
-use master::snapshot::file;
 use mechanics::element::shell4;
-use protocol::options::JobOptions;
 use tests::{
     bits::Fingerprint,
-    solve::{Solved, Workers, cross, keyword, model, solve, without_states},
+    solve::{Solved, Workers, cross, keyword, model, solve},
 };
 
-use crate::bits::{losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
+use crate::bits::{
+    losing_a_worker_changes_no_bit, same_bits, same_bits_from_files, same_bits_on_route_direct,
+};
 
 fn run(model: &Model, at_work: Workers) -> Solved {
     solve(model.clone(), at_work).unwrap_or_else(|e| panic!("{e}"))
@@ -51,18 +51,7 @@ fn a_worker_of_rigid_shells_that_is_lost_changes_no_bit() {
 fn a_snapshot_of_rigid_shells_goes_on_from_its_file_with_the_same_bits() {
     let mut model = whip();
     model.setup.control.end_cycle = 120;
-    let one = Fingerprint::of(&run(&model, Workers::default()));
-    let options = without_states(JobOptions { snapshot_at: Some(70), ..JobOptions::default() });
-    let taken =
-        run(&model, Workers { options, ..Workers::of(2) }).snapshot.expect("a snapshot was asked for");
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("snapshot.bolide");
-    file::write(&path, &taken).expect("a disk with room");
-    for workers in [1, 3, 5] {
-        let resume = Some(file::read(&path).expect("a whole file"));
-        let at_work = Workers { resume, ..Workers::of(workers) };
-        one.assert_equal(&Fingerprint::of(&run(&model, at_work)), &format!("resumed on {workers} workers"));
-    }
+    same_bits_from_files(&model, &[70]);
 }
 
 /// A strip of shells that bends: 10 by 2 elements with one row more at its root, which `root` holds.

@@ -1,14 +1,14 @@
 //! Joints: the same bits on any workers and both routes, over a loss and over a snapshot.
 
 use deck::Model;
-use master::snapshot::file;
-use protocol::options::JobOptions;
 use tests::{
     bits::Fingerprint,
-    solve::{Workers, model, solve, without_states},
+    solve::{Workers, model, solve},
 };
 
-use crate::bits::{fingerprint, losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
+use crate::bits::{
+    losing_a_worker_changes_no_bit, same_bits, same_bits_from_files, same_bits_on_route_direct,
+};
 
 /// A flail: an arm on a hinge that a curve drives, a chain of two links on balls, and a head on a universal joint, which strikes a block
 /// that deforms. A plate slides on the block's far side along a rail.
@@ -116,18 +116,7 @@ fn a_worker_of_a_flail_is_lost_without_a_bit() {
 
 #[test]
 fn a_flail_goes_on_from_its_snapshot_with_the_same_bits() {
-    let model = flail();
-    let one = fingerprint(&model, Workers::default());
-    let options = without_states(JobOptions { snapshot_at: Some(150), ..JobOptions::default() });
-    let taken = solve(model.clone(), Workers { options, ..Workers::of(2) }).unwrap_or_else(|e| panic!("{e}"));
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("snapshot.bolide");
-    file::write(&path, &taken.snapshot.expect("a snapshot was asked for")).expect("a disk with room");
-    for workers in [1, 3] {
-        let resume = Some(file::read(&path).expect("a whole file"));
-        let found = fingerprint(&model, Workers { resume, ..Workers::of(workers) });
-        one.assert_equal(&found, &format!("resumed on {workers} workers"));
-    }
+    same_bits_from_files(&flail(), &[150]);
 }
 
 /// A motion that a joint does not allow ends the run with the joint's name.

@@ -1,15 +1,15 @@
 //! Parts that are rigid for a time: what they keep, what they lose, and the same bits whatever happens in that time.
 
 use deck::Model;
-use master::snapshot::file;
 use mechanics::state::field;
-use protocol::options::JobOptions;
 use tests::{
     bits::Fingerprint,
-    solve::{Solved, Workers, cross, model, run, solve, without_states},
+    solve::{Solved, Workers, cross, model, run, solve},
 };
 
-use crate::bits::{losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
+use crate::bits::{
+    losing_a_worker_changes_no_bit, same_bits, same_bits_from_files, same_bits_on_route_direct,
+};
 
 /// A bar of copper, and what else its deck needs.
 fn bar(end: f64, rest: &str) -> Model {
@@ -36,7 +36,7 @@ fn struck(end: f64, rest: &str) -> Model {
     bar(end, &format!("[[wall]]\npoint = [0, 0, -0.05]\nnormal = [0.1, 0, 1]\n{rest}"))
 }
 
-/// Momentum, angular momentum about the origin, and the two kinetic energies of the nodes of a state.
+/// Momentum, angular momentum about the origin and kinetic energy of the nodes of a state.
 fn moments(solved: &Solved) -> ([f64; 3], [f64; 3], f64) {
     let state = &solved.state;
     let (mut momentum, mut angular, mut kinetic) = ([0.0; 3], [0.0; 3], 0.0);
@@ -181,26 +181,10 @@ fn parts_that_switch_have_the_same_bits_on_any_workers_and_routes() {
 fn losses_and_snapshots_while_parts_switch_change_no_bit() {
     let model = two_bars();
     losing_a_worker_changes_no_bit(&model);
-    let one = Fingerprint::of(&run(model.clone()));
-    let cycle_at = |time: f64| {
-        let solved = run(model.clone());
-        solved.rows.iter().find(|row| row.time >= time).expect("a later row").cycle
-    };
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("snapshot.bolide");
-    // Both rigid, at the very cycle of a switch, and all of them one.
-    for cycle in [cycle_at(8.5), cycle_at(9.0), cycle_at(9.0) + 1, cycle_at(18.0)] {
-        let options = without_states(JobOptions { snapshot_at: Some(cycle), ..JobOptions::default() });
-        let at_work = Workers { options, ..Workers::of(2) };
-        let taken = solve(model.clone(), at_work).expect("a run").snapshot.expect("a snapshot was asked for");
-        file::write(&path, &taken).expect("a disk with room");
-        for workers in [1, 3] {
-            let resume = Some(file::read(&path).expect("a whole file"));
-            let at_work = Workers { resume, ..Workers::of(workers) };
-            let solved = solve(model.clone(), at_work).expect("a run");
-            one.assert_equal(&Fingerprint::of(&solved), &format!("from cycle {cycle} on {workers} workers"));
-        }
-    }
+    let solved = run(model.clone());
+    let cycle_at = |time: f64| solved.rows.iter().find(|row| row.time >= time).expect("a later row").cycle;
+    // Both rigid, about the very cycle of a switch, and all of them one.
+    same_bits_from_files(&model, &[cycle_at(8.5), cycle_at(9.0), cycle_at(9.0) + 1, cycle_at(18.0)]);
 }
 
 /// A part that is led from rest: contact knows of the jump before it comes.

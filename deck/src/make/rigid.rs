@@ -16,10 +16,10 @@ use super::{
 use crate::{log::Log, typed::condition::Rigid};
 use held::Held;
 
-mod for_a_time;
 mod held;
+mod switch;
 
-pub(super) use for_a_time::make_for_a_time;
+pub(super) use switch::make_switches;
 
 /// A rigid body and what it is given.
 pub(super) struct RigidDraft<'d> {

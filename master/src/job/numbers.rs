@@ -44,7 +44,7 @@ pub(super) fn not_a_number(vote: Option<&Vote>, partials: &[f64], n_parts: usize
         let mut numbers = numbers
             .chain(passed)
             .chain(seen.chain(vote.element_gauges.iter().flat_map(|(_, state)| state.iter().copied())))
-            .chain([vote.force_bound, vote.contact_speed_squared]);
+            .chain([vote.force_bound, vote.contact_speed_squared, vote.strike]);
         let bad = numbers.find(|v| !v.is_finite());
         if let Some(value) = bad.or(Some(vote.courant).filter(|courant| courant.is_nan())) {
             return Some(format!(

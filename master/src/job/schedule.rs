@@ -351,6 +351,14 @@ mod tests {
     }
 
     #[test]
+    fn a_strike_below_seven_hundredths_of_the_speed_of_sound_limits_no_step_at_default_settings() {
+        let control = control();
+        let limit = |strike| strike_limit(&control, &Vote { courant: 1.0, strike, ..Vote::empty(1) });
+        assert!(limit(0.07) > control.safety_factor && limit(0.1) < control.safety_factor);
+        assert!(limit(0.0) == f64::INFINITY && (limit(10.0) - 0.012_198).abs() < 1e-6, "{}", limit(10.0));
+    }
+
+    #[test]
     fn an_output_time_is_the_same_multiple_whenever_it_is_asked_for() {
         for time in [0.0, 0.05, 0.09999999999999999] {
             assert_eq!(output_after(time, 0.1).to_bits(), 0.1_f64.to_bits(), "{time}");

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use mechanics::{state::GlobalState, vote::Vote};
-use protocol::message::ToWorker;
+use mechanics::{rigid::switch, state::GlobalState, vote::Vote};
+use protocol::{message::ToWorker, options::Balance};
 
-use super::{Job, checkpoints::Checkpoint, error::Error, samples::Stopped, workers::Goes};
+use super::{Job, balancing::Ground, checkpoints::Checkpoint, error::Error, samples::Stopped, workers::Goes};
 use crate::{
     event::{Action, WorkerSpec},
     incident::Loss,
@@ -108,6 +108,36 @@ impl Job {
         let worker = self.workers.spec(index).name.clone();
         self.tally.losses.push(Loss { worker, cycle, back_to: cycle, why });
         Ok(())
+    }
+
+    /// Whether the epoch is to end at a cycle: at once for processes that are to end, at a boundary for all others.
+    pub(super) fn wants_next_epoch(&mut self, cycle: u64) -> bool {
+        let at_work = &self.epoch.at_work;
+        cycle > self.epoch.schedule.first_cycle()
+            && (self.workers.has_leavers(at_work, Goes::Ends)
+                || (self.is_boundary(cycle)
+                    && (self.workers.has_newcomers(at_work)
+                        || self.workers.has_leavers(at_work, Goes::Needed)
+                        || self.wants_other_speeds(cycle))))
+    }
+
+    /// Whether parts are to become rigid, or to deform again, before the cycle that begins at a time.
+    pub(super) fn switches_at(&self, time: f64) -> bool {
+        let formed = &self.checkpoints.newest().continuation.formed;
+        switch::is_due(&self.model().setup.switches, formed, time)
+    }
+
+    /// Whether the epoch is to end for other speeds.
+    fn wants_other_speeds(&mut self, boundary: u64) -> bool {
+        if self.options.asked.balance == Balance::Given || self.epoch.n() < 2 {
+            return false;
+        }
+        let Some(medians) = self.epoch.meter.medians() else { return false };
+        let alive = self.epoch.sorts.eroded().map(crate::erosion::Eroded::alive);
+        let (model, node) = (&self.problem.model, self.options.costs.node);
+        let ground = Ground { mesh: &model.mesh, node, alive: alive.as_deref() };
+        let interval = u64::from(model.setup.control.plan_interval);
+        self.balancing.look((boundary, interval), &medians, &self.epoch.shares, &ground)
     }
 
     /// Everything that was booked after the checkpoint is forgotten, here and in the results.

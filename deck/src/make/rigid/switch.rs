@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Makes them; supports of their nodes hold the bodies, walls do not.
-pub(in crate::make) fn make_for_a_time(
+pub(in crate::make) fn make_switches(
     drafts: &[RigidDraft<'_>],
     lasting: &[Body],
     materials: &[Material],
