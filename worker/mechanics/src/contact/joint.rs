@@ -228,3 +228,72 @@ pub fn stacking(hits: &[Hit]) -> f64 {
     }
     most
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A random number from -1 to 1.
+    struct Random(u64);
+
+    impl Random {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        }
+
+        fn point(&mut self) -> Vector {
+            [self.next(), self.next(), self.next()]
+        }
+    }
+
+    /// Any of four corners may stand for two, wherever a face begins.
+    #[test]
+    fn a_node_near_a_spike_of_triangles_is_on_its_side() {
+        let mut random = Random(3);
+        let (mut counts, mut acute) = ([0; 2], 0);
+        for round in 0..100_000 {
+            let mut x = [random.point(), random.point(), random.point(), random.point()];
+            // Every other one is a spike.
+            if round % 2 == 0 {
+                x[0] = [8.0 * x[0][0], 8.0 * x[0][1], 8.0 * x[0][2]];
+            }
+            let away = |a: usize, b: usize| super::super::zone::sub(x[a], x[b]);
+            let volume = dot(away(1, 0), super::super::zone::cross(away(2, 0), away(3, 0)));
+            if volume.abs() < 0.05 {
+                continue;
+            }
+            if volume < 0.0 {
+                x.swap(1, 2);
+            }
+            let outward = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+            let faces = outward.map(|face| {
+                let at = (3.0 * random.next().abs()) as usize;
+                let [a, b, c] = [0, 1, 2].map(|i| face[(i + at) % 3]);
+                if random.next() > 0.0 { [a, b, c, c] } else { [a, a, b, c] }
+            });
+            let frames = faces.map(|face| Frame::new(&face.map(|n: u32| x[n as usize])));
+            let of = x[(random.next().abs() * 4.0) as usize];
+            let p = [0, 1, 2].map(|a| 0.3_f64.mul_add(random.next(), of[a]));
+            let height = |f: usize| {
+                let [a, b, c] = outward[f].map(|n| x[n as usize]);
+                let sub = super::super::zone::sub;
+                dot(sub(p, a), super::super::zone::cross(sub(b, a), sub(c, a)))
+            };
+            let heights = [0, 1, 2, 3].map(height);
+            let is_outside = heights.iter().any(|&h| h > 0.0);
+            let mut near = [0, 1, 2, 3].map(|f| Near {
+                face: f,
+                id: f,
+                corners: faces[f as usize],
+                nearest: frames[f as usize].nearest(p),
+            });
+            let (mut hits, mut beyond) = (vec![], vec![]);
+            reduce(&mut near, 100.0, |f| frames[f as usize], &mut hits, &mut beyond);
+            assert_eq!(hits[0].outer, is_outside, "round {round}: {x:?} {faces:?} {p:?}");
+            counts[usize::from(is_outside)] += 1;
+            acute += usize::from(near[0].nearest.sides == INNER && is_outside);
+        }
+        assert!(counts.iter().all(|&n| n > 1000) && acute > 100, "{counts:?} {acute}");
+    }
+}

@@ -240,25 +240,30 @@ impl Frame {
     /// the way round it takes: on a corner or the mid-point of a split face two vectors that span its angle.
     #[inline(always)]
     fn for_each_normal(&self, nearest: &Nearest, mut visit: impl FnMut(Vector, Option<(Vector, Vector)>)) {
-        let corner_edges = |c: usize| (self.edges[c], scale(-1.0, self.edges[(c + 3) & 3]));
         if self.flat {
             match nearest.feature {
-                Feature::Corner(c) => visit(self.normal, Some(corner_edges(c as usize))),
+                Feature::Corner(c) => {
+                    let (after, before) = (c as usize, (c as usize + 3) & 3);
+                    visit(self.normal, Some((self.edges[after], scale(-1.0, self.edges[before]))));
+                }
                 _ => visit(self.normal, None),
             }
             return;
         }
         let mid = middle(&self.corners);
         let spoke = |i: usize| sub(self.corners[i & 3], mid);
-        let normal = |i: usize| cross(spoke(i), spoke(i + 1));
+        let normal = |i: usize| cross(spoke(i), self.edges[i & 3]);
         let i = nearest.triangle as usize;
         match nearest.feature {
             Feature::Corner(c) => {
+                // A triangle has two corners in one: beyond both are the edges that meet there.
+                let has_length = |edge: usize| self.inverse_length2[edge & 3] > 0.0;
                 let c = c as usize;
-                let (after, before) = corner_edges(c);
+                let after = if has_length(c) { c } else { (c + 1) & 3 };
+                let before = if has_length(c + 3) { (c + 3) & 3 } else { (c + 2) & 3 };
                 let to_mid = scale(-1.0, spoke(c));
-                visit(normal(c), Some((after, to_mid)));
-                visit(normal(c + 3), Some((before, to_mid)));
+                visit(normal(after), Some((self.edges[after], to_mid)));
+                visit(normal(before), Some((scale(-1.0, self.edges[before]), to_mid)));
             }
             Feature::Edge(e) => visit(normal(e as usize), None),
             Feature::Face if nearest.shares[0] == 1.0 => {
@@ -382,7 +387,7 @@ fn on_triangles(w: &[Vector; 4]) -> Nearest {
         let j = (i + 1) & 3;
         let (region, shares, vector) = on_triangle([mid, w[i], w[j]], spoke[i], spoke[j]);
         let d2 = dot(vector, vector);
-        if d2 < best.0 {
+        if d2 < best.0 && has_length(sub(w[i], w[j])) {
             best = (d2, i, region, shares, vector);
         }
     }
@@ -394,8 +399,8 @@ fn on_triangles(w: &[Vector; 4]) -> Nearest {
         Region::Inside if shares[0] <= JOINT => Feature::Edge(i as u8),
         Region::Inside => Feature::Face,
     };
-    // The length of a normal has no say in its side.
-    let of = |i: usize| side(dot(cross(spoke[i & 3], spoke[(i + 1) & 3]), vector));
+    // The length of a normal has no say in its side; between two corners in one it is exactly zero.
+    let of = |i: usize| side(dot(cross(spoke[i & 3], sub(w[i & 3], w[(i + 1) & 3])), vector));
     let sides = match feature {
         Feature::Corner(c) => of(c as usize) | of(c as usize + 3),
         Feature::Edge(e) => of(e as usize),
@@ -405,6 +410,12 @@ fn on_triangles(w: &[Vector; 4]) -> Nearest {
         Feature::Face => of(i),
     };
     Nearest { feature, distance2, vector, sides, triangle: i as u8, shares }
+}
+
+/// Whether an edge is one; between two corners in one there is none, and rounding alone would give its triangle a side.
+#[inline(always)]
+fn has_length(edge: Vector) -> bool {
+    dot(edge, edge) > 0.0
 }
 
 /// Mean of four corners.

@@ -267,12 +267,13 @@ fn on_triangles<L: Lane>(w: &[V<L>; 4]) -> Point<L> {
         outer = L::select(at_a, zero, outer);
         let is_outer = zero.less(outer);
         let base = choose::<L>(is_outer, b, mid);
-        let last = choose::<L>(is_outer, sub(b, c), ac);
+        let edge = sub(b, c);
+        let last = choose::<L>(is_outer, edge, ac);
         let mut q = before(before(base, v, ab), x, last);
         // The corner itself, not what rounding makes of the way to it.
         q = choose::<L>(L::splat(1.5).less(outer), c, q);
         let q2 = dot(q, q);
-        let nearer = q2.less(distance2);
+        let nearer = L::both(q2.less(distance2), zero.less(dot(edge, edge)));
         distance2 = L::select(nearer, q2, distance2);
         triangle = L::select(nearer, L::splat(i as f64), triangle);
         next = L::select(nearer, L::splat(j as f64), next);
@@ -290,19 +291,27 @@ fn on_triangles<L: Lane>(w: &[V<L>; 4]) -> Point<L> {
     inner = L::select(almost.less_equal(shares[2]), to, inner);
     inner = L::select(almost.less_equal(shares[1]), from, inner);
     let feature = L::select(zero.less(border), edge_feature(shares[2], from, to, edge), inner);
-    let (highest, lowest) = sides(&spoke, vector, feature, triangle, next, shares);
+    let (highest, lowest) = sides(w, &spoke, vector, feature, triangle, next, shares);
     Point { distance2, vector, feature, triangle, highest, lowest, shares }
 }
 
 /// Greatest and least product of the vector with the normals of the triangles that meet at a closest point.
 #[inline(always)]
-fn sides<L: Lane>(spoke: &[V<L>; 4], vector: V<L>, feature: L, triangle: L, next: L, shares: V<L>) -> (L, L) {
+fn sides<L: Lane>(
+    w: &[V<L>; 4],
+    spoke: &[V<L>; 4],
+    vector: V<L>,
+    feature: L,
+    triangle: L,
+    next: L,
+    shares: V<L>,
+) -> (L, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let of = [
-        dot(cross(spoke[0], spoke[1]), vector),
-        dot(cross(spoke[1], spoke[2]), vector),
-        dot(cross(spoke[2], spoke[3]), vector),
-        dot(cross(spoke[3], spoke[0]), vector),
+        dot(cross(spoke[0], sub(w[0], w[1])), vector),
+        dot(cross(spoke[1], sub(w[1], w[2])), vector),
+        dot(cross(spoke[2], sub(w[2], w[3])), vector),
+        dot(cross(spoke[3], sub(w[3], w[0])), vector),
     ];
     // The face: its own triangle and, on a spoke, the one beyond.
     let before = triangle - one;
