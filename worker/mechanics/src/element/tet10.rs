@@ -14,7 +14,8 @@
 //! *Pressure.* An element has one pressure, by its volume, so it does not lock where it is nearly incompressible: with a pressure at each
 //! point a mesh would have a condition on its volume for every freedom that it has. What the rate of volume of a point has beside that of the
 //! element is resisted by `2 G / 3`, as the other components of the strain are by `2 G`, and yields with them: a field of strain whose
-//! deviator vanishes at all points would cost nothing without it. All motions but the six rigid ones are resisted, so
+//! deviator vanishes at all points would cost nothing without it. A point that has lost half of its share of the volume yields no further in
+//! this: else a corner that is pressed into the element, at the edge of a wedge that strikes, flows until it is turned inside out. All motions but the six rigid ones are resisted, so
 //! there is no hourglass control.
 //!
 //! *Nodes* are in the order of VTK, Abaqus, Nastran and LS-DYNA: edge nodes of 0-1, 1-2, 2-0, 0-3, 1-3 and 2-3. *Masses* are those that the
@@ -45,6 +46,9 @@ pub const NODES: usize = 10;
 
 /// The corners that each edge node stands between.
 pub const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
+
+/// Share of a quarter of the volume of the element below which a point no longer yields in its own rate of volume.
+const LEAST_SHARE: f64 = 0.5;
 
 /// Share of the mass of an element that its nodes carry: 1/32 at a corner, 7/48 on an edge.
 pub const SHARES: [f64; NODES] = {

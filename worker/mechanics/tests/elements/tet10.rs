@@ -6,15 +6,15 @@ use mechanics::{
     block::Block,
     element::{hourglass::Hourglass, tet10},
     lanes::Width,
-    material::{Failure, Material},
+    material::{Eos, Failure, Material},
     mesh::{Part, Topology},
     piece::Piece,
     state::field,
 };
 
 use crate::bodies::{
-    Draws, advance, all_laws, bare_step, carry, compute, elastic, force, full_step, kick, largest_force,
-    piece, stress,
+    Draws, advance, all_laws, bare_step, carry, compute, elastic, force, full_step, johnson_cook, kick,
+    largest_force, material, piece, stress,
 };
 
 /// Corners of an element of no symmetry.
@@ -251,6 +251,40 @@ fn a_linear_motion_of_a_distorted_mesh_strains_all_points_alike_and_pulls_at_no_
         let swelling = &block.piece().own[32..36];
         assert!(swelling.iter().flatten().all(|s| s.abs() < 1e-10 * size), "{material:?}");
     }
+}
+
+/// A corner is moved through the triangle of the edge nodes next to it: its point yields until half of its share of the volume is gone,
+/// then it presses back, and gives the work back on the way out.
+#[test]
+fn a_point_that_loses_its_volume_yields_no_further() {
+    let material = material(7896.0, Eos::Linear { bulk: 164e9 }, johnson_cook());
+    let x = straight(&SKEWED);
+    let triangle: [f64; 3] = std::array::from_fn(|axis| (x[4][axis] + x[6][axis] + x[7][axis]) / 3.0);
+    let mut block = Block::new(&single(&material, &x));
+    let n_steps = 300;
+    let dt = 1e-5;
+    // In, and half of the way out again.
+    let ways = [(1.0, n_steps), (-1.0, n_steps / 2)];
+    let mut swelling = Vec::new();
+    for (sign, n) in ways {
+        for axis in 0..3 {
+            block.v[axis][0] = sign * 1.3 * (triangle[axis] - x[0][axis]) / (f64::from(n_steps) * dt);
+        }
+        for _ in 0..n {
+            advance(&mut block, dt);
+            let vote = compute(&mut block, &material, &bare_step(dt, 1e11, 1e11), Width::best());
+            assert!(vote.fault.is_none());
+            swelling.push(block.piece().own[32][0]);
+        }
+    }
+    // At the triangle the share is 0.52.
+    let at_triangle = f64::from(n_steps) / 1.3;
+    let yielding = &swelling[..at_triangle as usize];
+    assert!(yielding.iter().all(|s| s.abs() < 1e9), "{yielding:?}");
+    let deepest = swelling[n_steps as usize - 1];
+    assert!((-30e9..-10e9).contains(&deepest), "{deepest:e}");
+    let last = swelling.last().expect("steps");
+    assert!(last.abs() < 1e9, "{last:e} after {deepest:e}");
 }
 
 #[test]

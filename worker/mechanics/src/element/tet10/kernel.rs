@@ -2,7 +2,7 @@
 //! the other. Energy, pressure and viscosity of the element are the steps of the hexahedron of one point.
 
 use super::{
-    NODES, POINTS, SHARES, SHOWN, SWELLING,
+    LEAST_SHARE, NODES, POINTS, SHARES, SHOWN, SWELLING,
     geometry::{Shape, no_tensor},
 };
 use crate::{
@@ -181,7 +181,8 @@ pub(super) unsafe fn slots<L: Lane, S: StrengthLaw, F: FailureLaw>(
         // SAFETY: the slot is inside the arrays.
         let before = unsafe { L::load(arrays.swelling[g], slot) };
         let grown = L::splat(2.0 / 3.0 * laws.strength.shear() * step.dt).mul_add(swells, before);
-        let swelling = grown * stressed.left;
+        let squeezed = points_at_end[g].less(L::splat(LEAST_SHARE * 0.25) * six_volumes);
+        let swelling = grown * L::select(squeezed, one, stressed.left);
         let of_point = (half * (before + swelling)).mul_add(swells, stressed.power);
         power = of_point.mul_add(points_at_mid[g], power);
         failed = L::both(failed, stressed.failed);
