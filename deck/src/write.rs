@@ -209,20 +209,32 @@ fn write_gauge(text: &mut Text, gauge: &Gauge) {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::read_to_string;
+
     use super::text;
     use crate::{
+        bundle::{self, Bundle, Options},
         log::Log,
-        make, toml_deck,
-        typed::{Deck, mesh::Meshes},
+        make, mesh_file, toml_deck,
+        typed::Deck,
     };
 
-    fn read(text: &str, name: &str) -> (Deck, String) {
-        let log = Log::toml(&[(name, text)]);
-        let deck = toml_deck::read(text, &log).unwrap_or_else(|| panic!("{name} has no syntax\n{text}"));
-        let model = make::model(&deck, &Meshes::new(), &log);
+    /// Reads a deck at a path with its meshes, which `gathered` has too.
+    fn read(gathered: &str, path: &str) -> (Deck, String) {
+        let bundle = Bundle::of(gathered, path).unwrap_or_else(|faults| panic!("{faults:?}"));
+        let log = Log::toml(&bundle.files);
+        let text = bundle.files[0].1;
+        let deck = toml_deck::read(text, &log).unwrap_or_else(|| panic!("{path} has no syntax\n{text}"));
+        let meshes = mesh_file::read_all(&bundle, Some(&deck), &log);
+        let model = make::model(&deck, &meshes.by_name, &log);
         let faults = log.into_lists().0;
-        assert!(faults.is_empty(), "{name}: {faults:?}\n{text}");
+        assert!(faults.is_empty() && meshes.faults.is_empty(), "{path}: {faults:?}\n{text}");
         (deck, format!("{model:?}"))
+    }
+
+    fn gather(path: &str, text: String) -> String {
+        bundle::gather(path, text, &Options::default(), &mut |path| read_to_string(path).ok())
+            .unwrap_or_else(|e| panic!("{path}: {e}"))
     }
 
     #[test]
@@ -237,9 +249,10 @@ mod tests {
                 }
                 seen += 1;
                 let name = path.display().to_string();
-                let (deck, model) = read(&std::fs::read_to_string(&path).expect("a deck is text"), &name);
+                let whole = gather(&name, read_to_string(&path).expect("a deck is text"));
+                let (deck, model) = read(&whole, &name);
                 let written = text(&deck);
-                let (_, again) = read(&written, &name);
+                let (_, again) = read(&gather(&name, written.clone()), &name);
                 assert!(model == again, "{name}\n{written}");
             }
         }

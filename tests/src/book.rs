@@ -165,6 +165,7 @@ macro_rules! each_case_of_the_book {
             friction: a_block_on_an_incline_rests_or_slides_after_coulomb long;
             perforation: a_blunt_projectile_goes_through_steel_from_the_measured_velocity_on long;
             cloud: a_sphere_at_six_kilometres_a_second_leaves_a_hole_with_lips_and_a_cloud long;
+            perforation: a_fragment_of_tetrahedra_keeps_of_its_velocity_what_thor_leaves_it long;
             perforation: an_ogive_keeps_of_its_velocity_what_it_kept_behind_a_slab_of_concrete long;
             rigid: a_free_top_precesses_after_euler quick;
             rigid: a_rigid_ball_that_strikes_a_block_keeps_both_momenta quick;

@@ -25,13 +25,12 @@ pub fn model(text: &str) -> Model {
     })
 }
 
-/// Reads an example deck of the repository.
+/// Reads an example deck of the repository, with its meshes.
 ///
 /// # Panics
 /// If it is not there or has faults.
 pub fn example(name: &str) -> Model {
-    let path = format!("{}/../deck/examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    model(&std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}")))
+    of_examples(&format!("{name}.toml"))
 }
 
 /// Reads an example of a keyword deck, with what it includes.
@@ -39,8 +38,13 @@ pub fn example(name: &str) -> Model {
 /// # Panics
 /// If it is not there or has faults.
 pub fn keyword(name: &str) -> Model {
-    let path = format!("{}/../deck/examples/{name}.k", env!("CARGO_MANIFEST_DIR"));
-    master::deck_file::read_deck(std::path::Path::new(&path)).unwrap_or_else(|faults| panic!("{faults}"))
+    of_examples(&format!("{name}.k"))
+}
+
+/// A deck of the examples with the files that it names.
+fn of_examples(file: &str) -> Model {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../deck/examples").join(file);
+    master::deck_file::read_deck(&path).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 /// Who computes, and what is asked beside the deck.

@@ -262,7 +262,7 @@ const WHOLE: u64 = 1_000_000;
 
 /// Every deck of `deck/examples`, the cycle at which its run ends, and what has happened by then. An explosive burns from the
 /// first cycle on.
-const EXAMPLES: [(&str, u64, Event); 29] = [
+const EXAMPLES: [(&str, u64, Event); 30] = [
     ("aramid-panel.toml", 1500, Event::Contact),
     ("ball-on-shell.k", WHOLE, Event::Contact),
     ("ball-tears-sheet.toml", 400, Event::Erosion),
@@ -290,6 +290,7 @@ const EXAMPLES: [(&str, u64, Event); 29] = [
     ("sphere-6-km-s.toml", 400, Event::Erosion),
     ("table-on-tubes.toml", 2000, Event::Contact),
     ("taylor-copper.toml", 3000, Event::None),
+    ("tetrahedral-fragment.toml", 1000, Event::Erosion),
     ("tube-crush.toml", WHOLE, Event::Contact),
     ("two-bars.toml", WHOLE, Event::Contact),
 ];

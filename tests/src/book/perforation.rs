@@ -7,7 +7,7 @@ use master::deck_file::read_deck_with;
 
 use crate::{
     case::Figures,
-    solve::{Solved, Workers, solve},
+    solve::{Solved, Workers, example, run, solve},
 };
 
 /// Velocity at which half of the blunt projectiles went through 12 mm of Weldox 460 E (m/s): Borvik and others (1999).
@@ -40,6 +40,16 @@ pub(super) fn a_blunt_projectile_goes_through_steel_from_the_measured_velocity_o
             way / PLATE,
         );
     }
+}
+
+pub(super) fn a_fragment_of_tetrahedra_keeps_of_its_velocity_what_thor_leaves_it(figures: &mut Figures) {
+    let solved = run(example("tetrahedral-fragment"));
+    figures.add(
+        "fragment through aluminium @ 600 m/s, residual velocity (m/s)",
+        600.0 * left_of_the_velocity(&solved),
+    );
+    let error = solved.rows.last().expect("rows").error;
+    figures.add("fragment through aluminium @ 600 m/s, energy error", error);
 }
 
 pub(super) fn an_ogive_keeps_of_its_velocity_what_it_kept_behind_a_slab_of_concrete(figures: &mut Figures) {
