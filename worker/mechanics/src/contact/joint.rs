@@ -180,18 +180,35 @@ fn pseudonormal(near: &[Near], i: usize, frame: &impl Fn(u32) -> Frame) -> Vecto
 }
 
 /// Drops hits on the wrong side of a patch: beside an acute edge the node lies outside by the nearer face and
-/// behind the other's plane. Of hits whose faces share a node the nearest one knows the side.
+/// behind the other's plane, and where a patch folds over itself, behind what it covers. Of hits of one patch
+/// the nearest one knows the side.
 fn agree(near: &[Near], hits: &mut Vec<Hit>) {
+    if hits.iter().all(|hit| hit.outer == hits[0].outer) {
+        return;
+    }
+    let patch = patches(near);
+    let of = |hit: &Hit| patch[hit.near as usize];
     for j in 1..hits.len() {
-        let of = |h: &Hit| &near[h.near as usize].corners;
-        let wrong = hits[..j]
-            .iter()
-            .any(|h| h.outer != hits[j].outer && of(h).iter().any(|n| of(&hits[j]).contains(n)));
-        if wrong {
+        let nearest = hits[..j].iter().find(|hit| of(hit) == of(&hits[j]));
+        if nearest.is_some_and(|nearest| nearest.outer != hits[j].outer) {
             hits[j].share = 0.0;
         }
     }
     hits.retain(|h| h.share > 0.0);
+}
+
+/// The patch of each near face, by the number of one of its faces: faces that share a node are of one patch.
+fn patches(near: &[Near]) -> Vec<usize> {
+    let mut patch: Vec<usize> = (0..near.len()).collect();
+    for (i, face) in near.iter().enumerate() {
+        for j in 0..i {
+            if patch[i] != patch[j] && near[j].corners.iter().any(|n| face.corners.contains(n)) {
+                let [from, to] = [patch[i], patch[j]];
+                patch.iter_mut().filter(|of| **of == from).for_each(|of| *of = to);
+            }
+        }
+    }
+    patch
 }
 
 /// Shares the push among hits that push the same way.
@@ -244,6 +261,45 @@ mod tests {
 
         fn point(&mut self) -> Vector {
             [self.next(), self.next(), self.next()]
+        }
+    }
+
+    /// The rim of a sphere of tetrahedra that flattens on a plate: two of its faces have folded under, with a corner above the node,
+    /// whose nearest face is another of the rim.
+    #[test]
+    fn what_a_patch_folds_over_is_not_inside() {
+        let x = [
+            [4.9454, 0.0432, -0.4601],
+            [4.9646, 0.0024, 0.0897],
+            [3.7283, -1.1531, -0.5548],
+            [3.2054, -0.0343, -0.6589],
+            [4.7088, 0.8717, -0.1258],
+            [4.5024, 0.8732, -0.3156],
+            [4.4883, -0.7762, -0.3097],
+            [4.7692, -0.7445, -0.1338],
+            [4.8459, -0.0011, -0.4635],
+        ];
+        let faces = [
+            [2, 3, 0, 0],
+            [1, 8, 4, 4],
+            [8, 0, 5, 5],
+            [8, 5, 4, 4],
+            [0, 8, 6, 6],
+            [8, 1, 7, 7],
+            [8, 7, 6, 6],
+        ];
+        let p = [4.8457, -0.0006, -0.5131];
+        let frames = faces.map(|face| Frame::new(&face.map(|n: u32| x[n as usize])));
+        for turned in 0..faces.len() {
+            // Of equals the first by its number is the feature's.
+            let id = |i: usize| ((i + turned) % faces.len()) as u32;
+            let mut near: Vec<Near> = (0..faces.len())
+                .map(|i| Near { face: i as u32, id: id(i), corners: faces[i], nearest: frames[i].nearest(p) })
+                .collect();
+            let (mut hits, mut beyond) = (vec![], vec![]);
+            reduce(&mut near, 0.0506, |i| frames[i as usize], &mut hits, &mut beyond);
+            assert_eq!(hits.len(), 1, "{hits:?}");
+            assert!(hits[0].outer && near[hits[0].near as usize].face == 0);
         }
     }
 
