@@ -248,7 +248,10 @@ pub fn stacking(hits: &[Hit]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{
+        super::zone::{cross, sub},
+        *,
+    };
 
     /// A random number from -1 to 1.
     struct Random(u64);
@@ -314,8 +317,8 @@ mod tests {
             if round % 2 == 0 {
                 x[0] = [8.0 * x[0][0], 8.0 * x[0][1], 8.0 * x[0][2]];
             }
-            let away = |a: usize, b: usize| super::super::zone::sub(x[a], x[b]);
-            let volume = dot(away(1, 0), super::super::zone::cross(away(2, 0), away(3, 0)));
+            let away = |a: usize, b: usize| sub(x[a], x[b]);
+            let volume = dot(away(1, 0), cross(away(2, 0), away(3, 0)));
             if volume.abs() < 0.05 {
                 continue;
             }
@@ -333,8 +336,7 @@ mod tests {
             let p = [0, 1, 2].map(|a| 0.3_f64.mul_add(random.next(), of[a]));
             let height = |f: usize| {
                 let [a, b, c] = outward[f].map(|n| x[n as usize]);
-                let sub = super::super::zone::sub;
-                dot(sub(p, a), super::super::zone::cross(sub(b, a), sub(c, a)))
+                dot(sub(p, a), cross(sub(b, a), sub(c, a)))
             };
             let heights = [0, 1, 2, 3].map(height);
             let is_outside = heights.iter().any(|&h| h > 0.0);
