@@ -233,7 +233,7 @@ fn number(drafts: &[PartDraft], log: &Log<'_>) -> Mesh {
         let first = mesh.positions.len() as u32;
         let file = draft.numbers.as_ref().and_then(|own| own.mesh.as_deref().map(|file| (file, own)));
         if let Some((file, own)) = file {
-            number_shared(&mut mesh, positions, topology, draft, file, own, &mut of_file);
+            number_shared(&mut mesh, (positions, topology), draft, (file, own), &mut of_file, log);
             owned(own, draft, &mut element_owner, &mut node_owner, log);
             continue;
         }
@@ -265,25 +265,36 @@ fn number(drafts: &[PartDraft], log: &Log<'_>) -> Mesh {
     mesh
 }
 
-/// Adds a part of a mesh file: nodes that an earlier part of the file has are that part's.
+/// Adds a part of a mesh file: nodes that an earlier part of the file has are that part's, and stand where it has them.
 fn number_shared<'a>(
     mesh: &mut Mesh,
-    positions: &[[f64; 3]],
-    topology: Topology,
+    (positions, topology): (&[[f64; 3]], Topology),
     draft: &PartDraft,
-    file: &'a str,
-    own: &Numbers,
+    (file, own): (&'a str, &Numbers),
     of_file: &mut BTreeMap<(&'a str, u32), u32>,
+    log: &Log<'_>,
 ) {
     let mut nodes = Vec::with_capacity(positions.len());
+    let mut apart = None;
     for (x, id) in positions.iter().zip(&own.nodes) {
         let next = mesh.positions.len() as u32;
         let node = *of_file.entry((file, *id)).or_insert(next);
         if node == next {
             mesh.positions.push(*x);
             mesh.node_ids.push(*id);
+        } else if mesh.positions[node as usize] != *x {
+            apart.get_or_insert((*id, node));
         }
         nodes.push(node);
+    }
+    if let Some((id, node)) = apart {
+        let other = mesh.parts.iter().find(|part| part.nodes.contains(&node));
+        log.fault(
+            draft.at,
+            format!("node {id} of \"{file}\" moved by part \"{}\"", draft.name),
+            format!("it where part \"{}\" has it", other.map_or("", |part| &part.name)),
+            "give parts that share nodes the same rotate, translate and place",
+        );
     }
     mesh.parts.push(Part {
         name: draft.name.clone(),

@@ -82,15 +82,15 @@ pub(super) fn make(
         let eight_points = has_eight_points(part, of_material, log);
         let hourglass = hourglass_of(part, of_material, hourglass, log);
         let (mut block, numbers) = mesh_of(part, meshes, &mut budget, log);
-        match &mut block {
-            Some(block) if numbers.as_ref().is_none_or(|own| own.mesh.is_none()) => transform(part, block),
-            Some(_) => {
-                let moves = part.rotate.as_ref().map(|r| r.origin);
-                for origin in moves.into_iter().chain(part.translate.as_ref().map(|by| by.origin)) {
-                    log.fault_of(origin, "a mesh file where it is", "move the nodes in the file");
-                }
-            }
-            None => {}
+        if let Some(block) = &mut block {
+            transform(part, block);
+        }
+        let file = numbers.as_ref().and_then(|own| meshes.get(own.mesh.as_ref()?)?.as_ref());
+        if let (Some(rotate), Some(mesh)) = (&part.rotate, file)
+            && !(mesh.file.velocities.is_empty() && mesh.file.spins.is_empty())
+        {
+            let expected = "a mesh file without velocities of its nodes, which would not turn";
+            log.fault_of(rotate.origin, expected, "turn both in the file");
         }
         if let (Some(origin), Some(Topology::Tetrahedra { .. })) =
             (part.eight_points, block.as_ref().map(|block| &block.topology))

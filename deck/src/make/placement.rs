@@ -37,10 +37,6 @@ pub(super) fn resolve(
     for p in order(&placements, &beside, parts, log) {
         let (Some(placement), Some(other)) = (placements[p], beside[p]) else { continue };
         let Some(gap) = placement.gap.or(default) else { continue };
-        if parts[p].numbers.as_ref().is_some_and(|own| own.mesh.is_some()) {
-            log.fault_of(placement.origin, "a part that is not of a mesh file", "move the nodes in the file");
-            continue;
-        }
         let (axis, above) = placement.side.axis();
         let [Some(own), Some(there)] = [p, other].map(|p| extent(&parts[p], axis)) else { continue };
         let way = if above { there[1] + gap - own[0] } else { there[0] - gap - own[1] };

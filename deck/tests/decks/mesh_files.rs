@@ -348,6 +348,41 @@ fn a_mesh_is_scaled_as_a_whole() {
     );
 }
 
+/// Parts of one file move together where they share nodes.
+#[test]
+fn parts_of_a_mesh_file_are_turned_and_moved() {
+    let (name, text, names) = FILES[0];
+    let moves = "rotate = { axis = [0, 0, 1], degrees = 90 }\ntranslate = [0, 0, 5]\n";
+    let deck = |solid: &str, skin: &str| {
+        let deck = deck_of(name, names, "");
+        deck.replace("velocity = [0, 0, 1]\n", &format!("velocity = [0, 0, 1]\n{solid}"))
+            .replace("shell = { thickness = 0.01 }\n", &format!("shell = {{ thickness = 0.01 }}\n{skin}"))
+    };
+    let read = |solid: &str, skin: &str, text: &str| {
+        deck::read(&gathered(&deck(solid, skin), &[(name, text)]), "deck.toml")
+    };
+    let at_home = read("", "", text).expect("a good deck").mesh;
+    let moved = read(moves, moves, text).expect("a good deck").mesh;
+    for (x, home) in moved.positions.iter().zip(&at_home.positions) {
+        assert_eq!(*x, [-home[1], home[0], home[2] + 5.0]);
+    }
+    let faults = read(moves, "", text).expect_err("they share nodes");
+    let told: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    assert_eq!(told.len(), 1, "{told:#?}");
+    for words in
+        ["moved by part \"skin\"", "where part \"solid\" has it", "the same rotate, translate and place"]
+    {
+        assert!(told[0].contains(words), "{words}: {told:#?}");
+    }
+    // Velocities of a file's own do not turn.
+    let own = format!("{}velocities 1\n1 0 0 2\n", self::read(KEYWORD, "body.k").text());
+    let deck = deck(moves, moves).replace(name, "body.mesh").replace("body = 2", "body = \"skin\"");
+    let deck = deck.replace("\"surface group 3\"", "\"set 1\"");
+    let faults = deck::read(&gathered(&deck, &[("body.mesh", &own)]), "deck.toml").expect_err("it moves");
+    assert!(faults.iter().all(|fault| fault.to_string().contains("velocities of its nodes")), "{faults:#?}");
+    assert_eq!(faults.len(), 2);
+}
+
 #[test]
 fn two_files_with_the_same_numbers_are_numbered_apart() {
     let deck = "title = \"two\"\nunits = \"SI\"\n[control]\nend_cycle = 1\n\
