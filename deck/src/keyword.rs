@@ -13,6 +13,7 @@ mod cards;
 mod condition;
 mod contact;
 mod control;
+mod damping;
 mod define;
 mod erosion;
 mod explosive;

@@ -28,7 +28,8 @@ use std::fmt;
 /// 11: the most workers that a job takes, and the seconds to its end; plies of shells in assignments.
 /// 13: workers that divide their threads.
 /// 14: votes foresee strikes on rigid walls, setups have parts that are rigid for a time.
-pub const VERSION: u16 = 14;
+/// 15: relaxation has a rate.
+pub const VERSION: u16 = 15;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

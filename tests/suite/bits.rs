@@ -331,6 +331,7 @@ fn every_load_and_wall_has_the_same_bits_on_both_routes() {
         curve = "pulse"
         [relaxation]
         factor = 0.999
+        rate = 0.002
         until = 40
         [[boundary]]
         type = "transmit"

@@ -9,7 +9,7 @@ use super::{
     cards::{Block, Lines},
     condition::Conditions,
     contact::ContactCard,
-    define, erosion, explosive,
+    damping, define, erosion, explosive,
     fields::{Context, TENS},
     inertia, joint, material, mesh,
     problem::{Problem, UnitsCard},
@@ -162,6 +162,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "DEFINE_COORDINATE_SYSTEM" | "DEFINE_COORDINATE_NODES" | "DEFINE_COORDINATE_VECTOR" => {
             define::read_system(problem, block, context);
         }
+        "DAMPING_GLOBAL" => damping::read(problem, block, context),
         "BOUNDARY_NON_REFLECTING" => transmit::read(problem, block, context),
         "INITIAL_DETONATION" => explosive::read_detonations(problem, block, context),
         // Lines that other programs draw.

@@ -50,6 +50,7 @@ pub(super) fn translate(
     blast::write(&mut t);
     condition::write_gravity(&mut t);
     condition::write_part_gravities(&mut t);
+    condition::write_damping(&mut t);
     condition::write_masses(&mut t);
     condition::write_walls(&mut t);
     contact::write(&mut t);

@@ -85,8 +85,11 @@ pub(super) fn make(
     let gravity =
         |g: &condition::Gravity| Gravity { acceleration: g.acceleration, drive: curves.of_entry(&g.drive) };
     draft.list.gravity = deck.gravity.as_ref().map(gravity);
-    draft.list.relaxation =
-        deck.relaxation.map(|r| Relaxation { factor: r.factor, until: r.until.unwrap_or(f64::MAX) });
+    draft.list.relaxation = deck.relaxation.map(|r| Relaxation {
+        factor: r.factor,
+        rate: r.rate,
+        until: r.until.unwrap_or(f64::MAX),
+    });
     draft
 }
 

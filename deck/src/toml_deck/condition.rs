@@ -334,10 +334,15 @@ pub(super) fn read_gravity(deck: &Table<'_>) -> Option<Gravity> {
 pub(super) fn read_relaxation(deck: &Table<'_>) -> Option<Relaxation> {
     let table = deck.get("relaxation")?.table("[relaxation]".to_string())?;
     let range = Range::Within(0.0, 1.0, "a number above 0 and at most 1");
-    let factor = table.number("factor", range);
+    // One of both at least.
+    let factor = match table.has("rate") {
+        true => Some(table.number_or("factor", 1.0, range)),
+        false => table.number("factor", range),
+    };
+    let rate = table.number_or("rate", 0.0, Range::Positive);
     let until = table.get("until").and_then(|v| v.number(Range::Positive));
     table.finish();
-    Some(Relaxation { factor: factor?, until })
+    Some(Relaxation { factor: factor?, rate, until })
 }
 
 /// Reads every `[[detonation]]`.

@@ -240,10 +240,13 @@ pub(crate) struct Gravity {
     pub(crate) drive: Drive,
 }
 
-/// Velocities that shrink in each cycle.
+/// Velocities that die away.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Relaxation {
+    /// In each cycle.
     pub(crate) factor: f64,
+    /// By time (1/time).
+    pub(crate) rate: f64,
     pub(crate) until: Option<f64>,
 }
 

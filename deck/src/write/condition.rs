@@ -41,7 +41,11 @@ pub(super) fn write(text: &mut Text, deck: &Deck) {
     }
     if let Some(relaxation) = deck.relaxation {
         text.heading("[relaxation]");
-        text.key("factor", format!("{:?}", relaxation.factor));
+        text.some(
+            "factor",
+            Some(relaxation.factor).filter(|factor| *factor != 1.0 || relaxation.rate == 0.0),
+        );
+        text.some("rate", Some(relaxation.rate).filter(|rate| *rate != 0.0));
         text.some("until", relaxation.until);
     }
     deck.walls.iter().for_each(|wall| write_wall(text, wall));

@@ -191,7 +191,7 @@ fn loads_curves_and_walls_are_as_the_deck_says() {
     assert_eq!(loads.curves[1].points, [[0.0, 3.0], [1e-3, 1.0]]);
     assert_eq!(loads.forces, [NodalForce { force: [1.0, 2.0, 3.0], by_mass: false, drive: ramp(1.0) }]);
     assert_eq!(loads.gravity, Some(Gravity { acceleration: [0.0, 0.0, -9.81], drive: Drive::constant(1.0) }));
-    assert_eq!(loads.relaxation, Some(Relaxation { factor: 0.99, until: 5e-4 }));
+    assert_eq!(loads.relaxation, Some(Relaxation { factor: 0.99, rate: 0.0, until: 5e-4 }));
     // Faces of a grid of 4 x 4 x 4: sides are those of the mechanics, so that 1 is k-max and 3 is i-max.
     let side = |corners: [usize; 4]| FACES.iter().position(|face| *face == corners).expect("a face") as u8;
     assert_eq!((side([4, 5, 6, 7]), side([1, 2, 6, 5])), (1, 3));

@@ -235,13 +235,27 @@ pub enum SurfaceKind {
     Transmit,
 }
 
-/// Velocities are multiplied by a factor each cycle, so that a structure comes to rest under its loads.
+/// Velocities die away, so that a structure comes to rest under its loads.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Relaxation {
-    /// The factor, from 0 to 1.
+    /// What velocities are multiplied by in each cycle, from 0 to 1.
     pub factor: f64,
+    /// Damping by mass, `-rate m v` (1/time).
+    pub rate: f64,
     /// Acts before this time (time).
     pub until: f64,
+}
+
+impl Loads {
+    /// Share of the velocity that relaxation takes at a time, where velocities before and after are `half_steps` apart (time). The force of the rate is
+    /// that of the mean of both, so no rate turns a velocity around.
+    pub fn loss(&self, time: f64, half_steps: f64) -> f64 {
+        let Some(Relaxation { factor, rate, .. }) = self.relaxation.filter(|r| time < r.until) else {
+            return 0.0;
+        };
+        let half = 0.5 * rate * half_steps;
+        1.0 - factor * ((1.0 - half).max(0.0) / (1.0 + half))
+    }
 }
 
 #[cfg(test)]

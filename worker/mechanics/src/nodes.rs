@@ -132,16 +132,16 @@ impl Task for Integration<'_, '_> {
 impl Advance<'_> {
     /// Gravity and relaxation in this step, if there are any.
     fn body(&self) -> Option<Body> {
-        let relaxation = self.loads.relaxation.filter(|r| self.time < r.until);
-        if self.loads.gravity.is_none() && relaxation.is_none() {
+        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        let loss = self.loads.loss(self.time, half_steps);
+        if self.loads.gravity.is_none() && loss == 0.0 {
             return None;
         }
-        let half_steps = 0.5 * (self.dt_previous + self.dt);
         let gain = self.loads.gravity.map_or([0.0; 3], |gravity| {
             let scale = half_steps * gravity.drive.at(&self.loads.curves, self.time);
             gravity.acceleration.map(|g| g * scale)
         });
-        Some(Body { gain, loss: relaxation.map_or(0.0, |r| 1.0 - r.factor) })
+        Some(Body { gain, loss })
     }
 
     /// Whether no step has led to `x_n`: velocities before are those of `t_n`.

@@ -279,8 +279,8 @@ impl Advance<'_> {
             let scale = half_steps * gravity.drive.at(curves, self.time);
             (0..3).for_each(|a| velocity[a] += gravity.acceleration[a] * scale);
         }
-        if let Some(relaxation) = self.loads.relaxation.filter(|r| self.time < r.until) {
-            let loss = 1.0 - relaxation.factor;
+        let loss = self.loads.loss(self.time, half_steps);
+        if loss != 0.0 {
             for a in 0..3 {
                 velocity[a] -= loss * state.velocity[a];
                 momentum[a] -= loss * state.momentum[a];

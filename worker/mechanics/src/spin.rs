@@ -83,8 +83,8 @@ impl Task for Turn<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lane>(mut self) -> (f64, Work) {
-        let relaxation = self.advance.loads.relaxation.filter(|r| self.advance.time < r.until);
-        let loss = relaxation.map_or(0.0, |r| 1.0 - r.factor);
+        let Advance { time, dt_previous, dt, .. } = self.advance;
+        let loss = self.advance.loads.loss(*time, 0.5 * (dt_previous + dt));
         let zero = L::splat(0.0);
         let mut sums = Sums { kinetic: zero, work: [zero; 2] };
         for index in 0..self.sets.len() {
@@ -192,7 +192,7 @@ mod tests {
         let constraints = [Constraint::default(), Constraint { clamped: 0b101, ..Constraint::default() }];
         let quantum = Quantum::for_reference(1e3, 42);
         for factor in [None, Some(0.9)] {
-            let relaxation = factor.map(|factor| Relaxation { factor, until: 1.0 });
+            let relaxation = factor.map(|factor| Relaxation { factor, rate: 0.0, until: 1.0 });
             let advance = Advance {
                 dt_previous: 1e-4,
                 dt: 3e-4,

@@ -11,7 +11,7 @@ use crate::{
     place::Place,
     typed::condition::{
         Boundary, BoundaryKind, Circle, Components, Drive, Faces, Gravity, Load, LoadKind, Lumped, Parts,
-        Region, Wall, WallMotion, WallShape, made,
+        Region, Relaxation, Wall, WallMotion, WallShape, made,
     },
 };
 
@@ -389,6 +389,12 @@ pub(super) fn write_gravity(t: &mut Translation<'_>) {
     let Some(curve) = t.curve(first.curve, Meaning::Velocity, first.at) else { return };
     let acceleration = t.vector(first.at, "an acceleration of", acceleration);
     t.deck.gravity = Some(Gravity { acceleration, drive: Drive::along(curve, 1.0) });
+}
+
+/// Mass damping of everything.
+pub(super) fn write_damping(t: &mut Translation<'_>) {
+    let rate = t.problem.damping.map(|(_, rate)| rate);
+    t.deck.relaxation = rate.map(|rate| Relaxation { factor: 1.0, rate, until: None });
 }
 
 /// Rigid walls.

@@ -272,6 +272,23 @@ fn faults_of_a_mesh_file_do_not_hide_those_of_its_deck() {
     assert!(found[1].starts_with("a.toml:4:13: read end_cycle = 0"), "{found:?}");
 }
 
+#[test]
+fn global_damping_is_a_rate_or_says_what_it_cannot_be() {
+    let deck = |card: &str| cube(&format!("*DAMPING_GLOBAL\n{card}\n"));
+    let rate = |card: &str| good(&deck(card)).model.setup.loads.relaxation.map(|r| [r.factor, r.rate]);
+    assert_eq!(rate("0,50"), Some([1.0, 50.0]));
+    assert_eq!(rate(",20,0.5,0.5,0.5,0.5,0.5,0.5"), Some([1.0, 10.0]));
+    assert_eq!(rate("0,0"), None);
+    let written = deck::convert(&deck("0,50"), "a.k", "a.mesh").expect("it was read").deck;
+    assert!(written.contains("[relaxation]\nrate = 50.0\n"), "{written}");
+    for (card, words) in
+        [("3,50", "read 3 (field 1"), ("0,50,1,0", "read 0 (field 4"), ("0,-1", "a rate of 0 or more")]
+    {
+        let found = faults(&deck(card));
+        assert!(found.len() == 1 && found[0].contains(words), "{found:?}");
+    }
+}
+
 /// What refers to a parameter that has no value is no fault of its own.
 #[test]
 fn a_parameter_without_a_value_is_one_fault_whatever_refers_to_it() {

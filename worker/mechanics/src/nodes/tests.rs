@@ -127,7 +127,7 @@ fn gravity_relaxation_and_nodal_force_change_the_velocity_and_book_their_work() 
         gravity: Some(Gravity { acceleration: [0.0, 0.0, -10.0], drive }),
         surfaces: Vec::new(),
         charges: Vec::new(),
-        relaxation: Some(Relaxation { factor: 0.9, until: 0.6 }),
+        relaxation: Some(Relaxation { factor: 0.9, rate: 0.0, until: 0.6 }),
     };
     let pushed = Constraint { forces: 1, ..Constraint::default() };
     let run = |loads| loaded_one([1.0, 2.0, 0.0], [0.0; 3], pushed, &[], loads);
@@ -141,8 +141,13 @@ fn gravity_relaxation_and_nodal_force_change_the_velocity_and_book_their_work() 
         "{:?}",
         booked.external
     );
-    let late = Loads { relaxation: Some(Relaxation { factor: 0.9, until: 0.5 }), ..loads.clone() };
+    let late = Loads { relaxation: Some(Relaxation { factor: 0.9, rate: 0.0, until: 0.5 }), ..loads.clone() };
     assert!((run(&late).1[1] - 2.0).abs() < 1e-15, "relaxation is over");
+    // exp(-0.1) is 0.904837.
+    let by_rate =
+        Loads { relaxation: Some(Relaxation { factor: 1.0, rate: 100.0, until: 0.6 }), ..loads.clone() };
+    assert!((run(&by_rate).1[1] - 2.0 * 0.95 / 1.05).abs() < 1e-15, "{:?}", run(&by_rate).1);
+    assert!((by_rate.loss(0.5, 1.0) - 1.0).abs() < 1e-15, "it stops, and does not turn around");
 }
 
 #[test]
@@ -187,7 +192,7 @@ fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
     let loads = Loads {
         forces: vec![NodalForce { force: [1e3, 0.0, 5e2], by_mass: false, drive: Drive::constant(1.0) }],
         gravity: Some(Gravity { acceleration: [0.0, 3.0, -10.0], drive: Drive::constant(1.0) }),
-        relaxation: Some(Relaxation { factor: 0.95, until: 1.0 }),
+        relaxation: Some(Relaxation { factor: 0.95, rate: 3.0, until: 1.0 }),
         ..Loads::default()
     };
     let advance = Advance {
