@@ -2,142 +2,26 @@
 //!
 //! The whole matrix, with worker processes, is the program `bits` of this package.
 
+mod compare;
 mod edges;
 mod shells;
 mod threads;
 
 use std::sync::Arc;
 
-use mechanics::{
-    lanes::Width,
-    state::{GlobalState, PartHistory},
-};
+use mechanics::state::{GlobalState, PartHistory};
 use tests::{
-    bits::{Fingerprint, forced_sorts},
-    solve::{Workers, example, keyword, model, solve, solve_through, without_states},
+    bits::Fingerprint,
+    solve::{Workers, example, keyword, model, solve, without_states},
 };
 
 use deck::Model;
-use master::{
-    embedded::Fate,
-    options::{CheckpointEvery, SessionOptions},
-    snapshot::file,
+use protocol::options::JobOptions;
+
+pub(crate) use compare::{
+    asked, fingerprint, losing_a_worker_changes_no_bit, same_bits, same_bits_from_files,
+    same_bits_on_route_direct,
 };
-use protocol::options::{JobOptions, Route};
-
-pub(crate) fn fingerprint(model: &Model, at_work: Workers) -> Fingerprint {
-    Fingerprint::of(&solve(model.clone(), at_work).unwrap_or_else(|e| panic!("{e}")))
-}
-
-/// A set of workers with these options.
-pub(crate) fn asked(workers: usize, options: SessionOptions) -> Workers {
-    Workers { options, ..Workers::of(workers) }
-}
-
-/// Every workers whose bits are compared with those of one worker of one thread.
-fn worker_sets() -> Vec<(String, Workers)> {
-    let mut worker_sets = Vec::new();
-    for workers in [2, 3, 5, 7] {
-        worker_sets.push((format!("{workers} workers"), Workers::of(workers)));
-    }
-    for workers in [1, 2] {
-        worker_sets.push((
-            format!("{workers} workers of 2 threads"),
-            Workers { threads: 2, ..Workers::of(workers) },
-        ));
-    }
-    worker_sets
-        .push(("speeds 1, 2, 0.5".to_owned(), Workers { speeds: vec![1.0, 2.0, 0.5], ..Workers::default() }));
-    for width in Width::ALL.into_iter().filter(|width| width.available()) {
-        let options = without_states(JobOptions { lanes: Some(width.to_string()), ..JobOptions::default() });
-        worker_sets.push((format!("{width}, 2 workers"), asked(2, options)));
-    }
-    worker_sets
-}
-
-/// Compares runs of a problem on all sets of workers, with sorts forced, and over a snapshot.
-pub(crate) fn same_bits(model: &Model) {
-    let cycles = model.setup.control.end_cycle;
-    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
-    let one = Fingerprint::of(&alone);
-    assert_eq!(alone.state.cycle, cycles);
-    let met = alone.outcome.run_totals.worst_penetration > 0.0;
-    assert_eq!(met, model.setup.contact.is_some(), "contact without a hit compares nothing");
-    for (name, at_work) in worker_sets() {
-        one.assert_equal(&fingerprint(model, at_work), &name);
-    }
-    if model.setup.contact.is_some() {
-        for sorts in forced_sorts() {
-            for workers in [1, 3] {
-                let name = format!("{workers} workers, sorts {:?} {:?}", sorts.sort_every, sorts.sort_seed);
-                let options = without_states(sorts.clone());
-                one.assert_equal(&fingerprint(model, asked(workers, options)), &name);
-            }
-        }
-        let mut slack = model.clone();
-        slack.setup.contact.as_mut().expect("just asked").slack *= 2.0;
-        one.assert_equal(&fingerprint(&slack, Workers::of(2)), "doubled slack");
-    }
-    let options = without_states(JobOptions { snapshot_at: Some(cycles / 2), ..JobOptions::default() });
-    let whole = solve(model.clone(), asked(2, options)).unwrap_or_else(|e| panic!("{e}"));
-    one.assert_equal(&Fingerprint::of(&whole), "a snapshot taken on the way");
-    let snapshot = whole.snapshot.expect("a snapshot was asked for");
-    assert_eq!(snapshot.state.cycle, cycles / 2);
-    for workers in [1, 3] {
-        let options = without_states(JobOptions { sort_seed: Some(5), ..JobOptions::default() });
-        let at_work = Workers { resume: Some(snapshot.clone()), ..asked(workers, options) };
-        one.assert_equal(&fingerprint(model, at_work), &format!("restored on {workers} workers"));
-    }
-}
-
-/// Goes on with a run from snapshots of these cycles, each written to a file and read from it.
-pub(crate) fn same_bits_from_files(model: &Model, cycles: &[u64]) {
-    let one = fingerprint(model, Workers::default());
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("snapshot.bolide");
-    for &cycle in cycles {
-        let options = without_states(JobOptions { snapshot_at: Some(cycle), ..JobOptions::default() });
-        let taken = solve(model.clone(), asked(2, options)).unwrap_or_else(|e| panic!("{e}"));
-        file::write(&path, &taken.snapshot.expect("a snapshot was asked for")).expect("a disk with room");
-        for workers in [1, 3, 5] {
-            let resume = Some(file::read(&path).expect("a whole file"));
-            let found = fingerprint(model, Workers { resume, ..Workers::of(workers) });
-            one.assert_equal(&found, &format!("from cycle {cycle} on {workers} workers"));
-        }
-    }
-}
-
-/// Compares `one`, a run on one worker, with runs on route direct.
-pub(crate) fn same_bits_on_route_direct(model: &Model, one: &Fingerprint) {
-    for workers in [2, 3, 5] {
-        let options = without_states(JobOptions { route: Some(Route::Direct), ..JobOptions::default() });
-        one.assert_equal(&fingerprint(model, asked(workers, options)), &format!("{workers} workers, direct"));
-    }
-}
-
-/// Loses each of three workers at several moments of a run, on either route.
-pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
-    let one = fingerprint(model, Workers::default());
-    let mut arrivals = 0;
-    let mut count = |number: u64| {
-        arrivals = number;
-        None
-    };
-    solve_through(model.clone(), Workers::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
-    let mut midway = 0;
-    for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
-        let options = without_states(JobOptions { route: Some(route), ..JobOptions::default() });
-        let options = SessionOptions { keep: CheckpointEvery::Cycles(10), ..options };
-        let at = arrivals * (seed as u64 + 4) / 12;
-        let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
-        let solved = solve_through(model.clone(), asked(3, options), &mut fate)
-            .unwrap_or_else(|e| panic!("{seed}: {e}"));
-        one.assert_equal(&Fingerprint::of(&solved), &format!("loss {seed}, {route:?}"));
-        assert_eq!(solved.outcome.losses.len(), 1, "{seed}");
-        midway += usize::from(solved.outcome.losses[0].back_to > 0);
-    }
-    assert!(midway >= 4, "{midway} of 8 went back to a state on the way");
-}
 
 /// Steel that shatters a ceramic tile, whose law declares history variables; behind it copper, whose law has none.
 const TILE: &str = r#"

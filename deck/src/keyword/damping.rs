@@ -14,14 +14,17 @@ pub(super) fn read(problem: &mut Problem, block: &Block<'_>, context: &Context<'
         f.fault(0, "no curve: damping is constant", "leave LCID blank and give VALDMP");
     }
     let shares = [2, 3, 4, 5, 6, 7].map(|i| f.real(i, 0.0));
-    let share = if shares == [0.0; 6] { 1.0 } else { shares[0] };
-    if let Some(i) = (3..8).find(|i| shares != [0.0; 6] && shares[i - 2] != share) {
-        f.fault(i, format!("{share}, as STX: all directions and turns alike"), "leave STX to SRZ blank");
+    if let Some(i) = shares.iter().position(|share| *share != shares[0]) {
+        f.fault(
+            2 + i,
+            format!("{}, as STX: all directions and turns alike", shares[0]),
+            "leave STX to SRZ blank",
+        );
     }
+    let share = if shares[0] == 0.0 { 1.0 } else { shares[0] };
     let rate = f.real(1, 0.0) * share;
     if rate < 0.0 {
         f.fault(1, "a rate of 0 or more", "correct it");
-    } else if rate > 0.0 {
-        problem.damping = Some((f.at, rate + problem.damping.map_or(0.0, |(_, before)| before)));
     }
+    problem.damping += rate;
 }

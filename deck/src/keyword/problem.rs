@@ -154,8 +154,8 @@ pub(super) struct Problem {
     /// Sets of segments through which waves leave.
     pub(super) transmitting: Vec<(Place, u32)>,
     pub(super) blasts: Blasts,
-    /// Rate of mass damping (1/time).
-    pub(super) damping: Option<(Place, f64)>,
+    /// Rate of mass damping (1/time); 0 without.
+    pub(super) damping: f64,
     pub(super) conditions: Conditions,
     pub(super) rigid: RigidCards,
     pub(super) joints: Vec<JointCard>,

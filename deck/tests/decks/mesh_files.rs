@@ -366,6 +366,16 @@ fn parts_of_a_mesh_file_are_turned_and_moved() {
     for (x, home) in moved.positions.iter().zip(&at_home.positions) {
         assert_eq!(*x, [-home[1], home[0], home[2] + 5.0]);
     }
+    // The body is from 0 to 2 along z.
+    let above = format!(
+        "title = \"a\"\nunits = \"SI\"\n[control]\nend_cycle = 1\n[[part]]\nname = \"solid\"\nmaterial = \"LEAD\"\n\
+         mesh = {{ file = \"{name}\" }}\nplace = {{ above = \"block\", gap = 0.5 }}\n[[part]]\nname = \"block\"\nmaterial = \"LEAD\"\n\
+         box = {{ origin = [0, 0, 7], size = [1, 1, 1], cells = [1, 1, 1] }}\n"
+    );
+    let above = deck::read(&gathered(&above, &[(name, text)]), "deck.toml").expect("a good deck").mesh;
+    let lowest =
+        above.parts[0].nodes.iter().map(|&n| above.positions[n as usize][2]).fold(f64::MAX, f64::min);
+    assert_eq!(lowest, 8.5);
     let faults = read(moves, "", text).expect_err("they share nodes");
     let told: Vec<String> = faults.iter().map(ToString::to_string).collect();
     assert_eq!(told.len(), 1, "{told:#?}");

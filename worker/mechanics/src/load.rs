@@ -247,8 +247,8 @@ pub struct Relaxation {
 }
 
 impl Loads {
-    /// Share of the velocity that relaxation takes at a time, where velocities before and after are `half_steps` apart (time). The force of the rate is
-    /// that of the mean of both, so no rate turns a velocity around.
+    /// Share of the velocity that relaxation takes at a time, where velocities before and after are `half_steps` apart (time). The
+    /// force of the rate is that of the mean of both, so no rate turns a velocity around.
     pub fn loss(&self, time: f64, half_steps: f64) -> f64 {
         let Some(Relaxation { factor, rate, .. }) = self.relaxation.filter(|r| time < r.until) else {
             return 0.0;

@@ -132,16 +132,25 @@ impl Task for Integration<'_, '_> {
 impl Advance<'_> {
     /// Gravity and relaxation in this step, if there are any.
     fn body(&self) -> Option<Body> {
-        let half_steps = 0.5 * (self.dt_previous + self.dt);
-        let loss = self.loads.loss(self.time, half_steps);
+        let loss = self.loss();
         if self.loads.gravity.is_none() && loss == 0.0 {
             return None;
         }
         let gain = self.loads.gravity.map_or([0.0; 3], |gravity| {
-            let scale = half_steps * gravity.drive.at(&self.loads.curves, self.time);
+            let scale = self.half_steps() * gravity.drive.at(&self.loads.curves, self.time);
             gravity.acceleration.map(|g| g * scale)
         });
         Some(Body { gain, loss })
+    }
+
+    /// From `t_{n-1/2}` to `t_{n+1/2}` (time).
+    fn half_steps(&self) -> f64 {
+        0.5 * (self.dt_previous + self.dt)
+    }
+
+    /// Share of the velocity that relaxation takes in this step.
+    pub(crate) fn loss(&self) -> f64 {
+        self.loads.loss(self.time, self.half_steps())
     }
 
     /// Whether no step has led to `x_n`: velocities before are those of `t_n`.
@@ -156,7 +165,7 @@ impl Advance<'_> {
 
     /// The force on a node that brings it to `target` in this step, whatever gravity and relaxation do.
     pub(crate) fn leading(&self, x: [f64; 3], v: [f64; 3], mass: f64, target: [f64; 3]) -> [f64; 3] {
-        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        let half_steps = self.half_steps();
         if self.dt == 0.0 || half_steps == 0.0 {
             return [0.0; 3];
         }
@@ -169,11 +178,11 @@ impl Advance<'_> {
 
     /// The moment on a node of shells that turns it at `target` after this step, whatever relaxation does.
     pub(crate) fn turning(&self, spin: [f64; 3], inertia: f64, target: [f64; 3]) -> [f64; 3] {
-        let half_steps = 0.5 * (self.dt_previous + self.dt);
+        let half_steps = self.half_steps();
         if half_steps == 0.0 {
             return [0.0; 3];
         }
-        let loss = self.body().map_or(0.0, |body| body.loss);
+        let loss = self.loss();
         std::array::from_fn(|a| inertia / half_steps * (target[a] - spin[a] + loss * spin[a]))
     }
 

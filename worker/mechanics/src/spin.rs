@@ -83,8 +83,7 @@ impl Task for Turn<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lane>(mut self) -> (f64, Work) {
-        let Advance { time, dt_previous, dt, .. } = self.advance;
-        let loss = self.advance.loads.loss(*time, 0.5 * (dt_previous + dt));
+        let loss = self.advance.loss();
         let zero = L::splat(0.0);
         let mut sums = Sums { kinetic: zero, work: [zero; 2] };
         for index in 0..self.sets.len() {

@@ -393,8 +393,8 @@ pub(super) fn write_gravity(t: &mut Translation<'_>) {
 
 /// Mass damping of everything.
 pub(super) fn write_damping(t: &mut Translation<'_>) {
-    let rate = t.problem.damping.map(|(_, rate)| rate);
-    t.deck.relaxation = rate.map(|rate| Relaxation { factor: 1.0, rate, until: None });
+    let rate = t.problem.damping;
+    t.deck.relaxation = (rate != 0.0).then_some(Relaxation { factor: 1.0, rate, until: None });
 }
 
 /// Rigid walls.

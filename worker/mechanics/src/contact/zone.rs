@@ -257,10 +257,9 @@ impl Frame {
         match nearest.feature {
             Feature::Corner(c) => {
                 // A triangle has two corners in one: beyond both are the edges that meet there.
-                let has_length = |edge: usize| self.inverse_length2[edge & 3] > 0.0;
-                let c = c as usize;
-                let after = if has_length(c) { c } else { (c + 1) & 3 };
-                let before = if has_length(c + 3) { (c + 3) & 3 } else { (c + 2) & 3 };
+                let (c, previous) = (c as usize, (c as usize + 3) & 3);
+                let after = if has_length(self.edges[c]) { c } else { (c + 1) & 3 };
+                let before = if has_length(self.edges[previous]) { previous } else { (c + 2) & 3 };
                 let to_mid = scale(-1.0, spoke(c));
                 visit(normal(after), Some((self.edges[after], to_mid)));
                 visit(normal(before), Some((scale(-1.0, self.edges[before]), to_mid)));

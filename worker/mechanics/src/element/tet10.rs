@@ -15,8 +15,8 @@
 //! point a mesh would have a condition on its volume for every freedom that it has. What the rate of volume of a point has beside that of the
 //! element is resisted by `2 G / 3`, as the other components of the strain are by `2 G`, and yields with them: a field of strain whose
 //! deviator vanishes at all points would cost nothing without it. A point that has lost half of its share of the volume yields no further in
-//! this: else a corner that is pressed into the element, at the edge of a wedge that strikes, flows until it is turned inside out. All motions but the six rigid ones are resisted, so
-//! there is no hourglass control.
+//! this: else a corner that is pressed into the element, at the edge of a wedge that strikes, flows until it is turned inside out. All
+//! motions but the six rigid ones are resisted, so there is no hourglass control.
 //!
 //! *Nodes* are in the order of VTK, Abaqus, Nastran and LS-DYNA: edge nodes of 0-1, 1-2, 2-0, 0-3, 1-3 and 2-3. *Masses* are those that the
 //! small tetrahedra give their corners, the mean of the edge nodes its share to each of these: inside a mesh nodes at corners and on edges carry
