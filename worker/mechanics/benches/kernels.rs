@@ -238,13 +238,7 @@ fn plates(
     };
     let sheet = || {
         let quads = (0..side * side).map(|e| e / side * row + e % side);
-        let section = Section {
-            thickness: 0.2 * size,
-            rule: Rule::Gauss(5),
-            thins: true,
-            breaks: None,
-            laminate: None,
-        };
+        let section = Section::of(0.2 * size, Rule::Gauss(5));
         Part {
             name: "sheet".into(),
             material: 1,

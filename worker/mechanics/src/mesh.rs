@@ -18,7 +18,7 @@ use crate::element::{
     beam2::BeamSection,
     hex8::{self, points},
     hourglass::{Hourglass, N_FORCES},
-    shell4::{self, Rule},
+    shell4::{self, InPlane, Rule},
     tet10,
 };
 
@@ -111,14 +111,34 @@ pub struct Section {
     pub breaks: Option<f64>,
     /// Plies and axes of a composite; none of a material that is the same in all directions.
     pub laminate: Option<Laminate>,
+    /// Points in the plane; one of a laminate.
+    pub in_plane: InPlane,
+    /// Whether it is a membrane: it carries forces in its plane alone, has one point through the thickness and no plies.
+    pub is_membrane: bool,
 }
 
 impl Section {
+    /// A section of this thickness that thins and does not break, with one point in the plane.
+    pub fn of(thickness: f64, rule: Rule) -> Self {
+        Self {
+            thickness,
+            rule,
+            thins: true,
+            breaks: None,
+            laminate: None,
+            in_plane: InPlane::One,
+            is_membrane: false,
+        }
+    }
+
     /// Number of arrays that such shells have of their own ([`crate::piece::Piece::own`]). The layers of a laminate have history variables instead.
     pub fn n_fields(&self) -> usize {
         match self.laminate {
             Some(_) => shell4::ELEMENT,
-            None => shell4::ELEMENT + shell4::LAYER * self.rule.points().map_or(0, |points| points.len()),
+            None => {
+                let points = self.rule.points().map_or(0, |points| points.len());
+                shell4::ELEMENT + shell4::LAYER * points * self.in_plane.points()
+            }
         }
     }
 }

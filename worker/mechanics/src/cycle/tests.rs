@@ -177,7 +177,7 @@ fn folding_plate() -> Domain {
     let nodes: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     mesh.node_ids.clone_from(&nodes);
     let element_ids: Vec<u32> = (0..quads.len() as u32).collect();
-    let section = Section { thickness: 0.2, rule: Rule::Gauss(3), thins: true, breaks: None, laminate: None };
+    let section = Section::of(0.2, Rule::Gauss(3));
     let topology = Topology::Shells { quads, section };
     mesh.parts.push(Part {
         name: "plate".into(),

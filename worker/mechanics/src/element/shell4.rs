@@ -1,4 +1,4 @@
-//! The four-node shell with one point in the plane and several through the thickness.
+//! The four-node shell with one point or four in the plane (`plane`) and several through the thickness.
 //!
 //! A point at height z above the middle surface lies at `x + z p` and moves with `v + z w x p`: velocities v, rotation
 //! rates w and corner fibers p, all bilinear. The velocity strains are those of that motion to first order in z, with
@@ -21,7 +21,9 @@ mod geometry;
 mod kernel;
 mod laminate;
 mod layers;
+mod plane;
 mod section_error;
+mod shells;
 
 use serde::{Deserialize, Serialize};
 
@@ -30,15 +32,36 @@ use geometry::Geometry;
 use crate::{element::vector::Vector, lanes::scalar::Scalar};
 
 pub(crate) use block::Core;
-pub use block::{ShellStep, Shells};
+pub use block::ShellStep;
 pub use kernel::{ELEMENT, THICKNESS};
 pub use layers::LAYER;
 pub use section_error::SectionError;
+pub use shells::Shells;
 
 /// Axes of the frame of an element with its corners at `x`.
 pub(crate) fn frame(x: &[[f64; 3]; 4]) -> [[f64; 3]; 3] {
     let corners = x.map(|[x, y, z]| Vector { x: Scalar(x), y: Scalar(y), z: Scalar(z) });
     Geometry::of(&corners).e.map(|axis| [axis.x.0, axis.y.0, axis.z.0])
+}
+
+/// Points in the plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum InPlane {
+    /// One in the middle; hourglass control resists what it does not see.
+    #[default]
+    One,
+    /// Gauss's two by two, which see every motion in the plane and every bending: full integration.
+    Four,
+}
+
+impl InPlane {
+    /// How many they are.
+    pub fn points(self) -> usize {
+        match self {
+            Self::One => 1,
+            Self::Four => plane::FOUR,
+        }
+    }
 }
 
 /// Points through the thickness: heights by half the thickness and weights that add up to 1.

@@ -113,7 +113,7 @@ fn tube(radius: f64, length: f64, thickness: f64, n: u32) -> Mesh {
         material: 0,
         topology: Topology::Shells {
             quads: (0..n * n).map(quad).collect(),
-            section: Section { thickness, rule: Rule::Gauss(2), thins: true, breaks: None, laminate: None },
+            section: Section::of(thickness, Rule::Gauss(2)),
         },
         nodes: (0..n * (n + 1)).collect(),
         element_ids: (1..=n * n).collect(),

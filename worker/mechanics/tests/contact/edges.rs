@@ -120,7 +120,7 @@ fn two_sheets() -> Mesh {
     let upper = across.iter().map(|&[y, x]| [x, y, 1.0]);
     let positions: Vec<[f64; 3]> = lower.chain(upper).collect();
     let quads = vec![[0, 2, 3, 1], [2, 4, 5, 3], [6, 7, 9, 8], [8, 9, 11, 10]];
-    let section = Section { thickness: 0.1, rule: Rule::Gauss(2), thins: true, breaks: None, laminate: None };
+    let section = Section::of(0.1, Rule::Gauss(2));
     let part = Part {
         name: "sheets".into(),
         material: 0,

@@ -65,7 +65,7 @@ fn composite(law: ChangChang) -> Material {
 fn laid(thickness: f64, points: u32, angles: &[f64], axis: Axis) -> Section {
     let plies = Plies::Stacked(angles.iter().map(|&angle| Ply { angle, share: 0.125e-3 }).collect());
     let laminate = Some(Laminate { axis, plies });
-    Section { thickness, rule: Rule::Gauss(points), thins: true, breaks: None, laminate }
+    Section { laminate, ..Section::of(thickness, Rule::Gauss(points)) }
 }
 
 /// Heights, from the middle, and weights of such layers.

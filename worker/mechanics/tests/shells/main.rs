@@ -3,16 +3,32 @@
 #![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
 
 mod laminate;
+mod plane;
 
 use mechanics::{
     element::{
         ElementVote,
-        shell4::{Rule, ShellStep, Shells},
+        shell4::{InPlane, Rule, ShellStep, Shells},
     },
     exact::Quantum,
     lanes::Width,
     material::{Eos, Failure, Heat, Material, Strength},
+    mesh::Section,
 };
+
+/// Points in the plane.
+const IN_PLANE: [InPlane; 2] = [InPlane::One, InPlane::Four];
+
+/// Shells of a section with these points in the plane and through the thickness.
+fn shells(
+    (x, corners): (&[[f64; 3]], &[[u32; 4]]),
+    thickness: f64,
+    (in_plane, rule): (InPlane, Rule),
+    material: &Material,
+) -> Shells {
+    let section = Section { in_plane, ..Section::of(thickness, rule) };
+    Shells::of(x, corners, &section, material).expect("a sound section")
+}
 
 fn material(young: f64, poisson: f64, density: f64) -> Material {
     let shear = 0.5 * young / (1.0 + poisson);
@@ -103,9 +119,13 @@ fn warped() -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
 
 #[test]
 fn a_rigid_rotation_of_a_warped_patch_leaves_no_stress_and_no_force() {
+    IN_PLANE.into_iter().for_each(a_rigid_rotation_leaves_nothing);
+}
+
+fn a_rigid_rotation_leaves_nothing(in_plane: InPlane) {
     let (x, corners) = warped();
     let steel = material(2e11, 0.3, 7800.0);
-    let mut shells = Shells::new(&x, &corners, 0.05, Rule::Gauss(5), &steel).expect("a sound section");
+    let mut shells = shells((&x, &corners), 0.05, (in_plane, Rule::Gauss(5)), &steel);
     let (angle, dt) = (0.05, 1e-6);
     // The chord of the rotation by `angle` about `axis` turns the middle of the step by twice its tangent.
     let axis = [2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0];
@@ -124,7 +144,7 @@ fn a_rigid_rotation_of_a_warped_patch_leaves_no_stress_and_no_force() {
         shells.compute(&step(dt, 1e10), Width::best());
     }
     for element in 0..corners.len() {
-        for layer in 0..5 {
+        for layer in 0..5 * in_plane.points() {
             let stress = shells.stress(element, layer);
             assert!(stress.iter().all(|s| s.abs() < 1e-9 * 2e11), "{element}.{layer}: {stress:?}");
         }
@@ -135,31 +155,28 @@ fn a_rigid_rotation_of_a_warped_patch_leaves_no_stress_and_no_force() {
 
 #[test]
 fn constant_strain_curvature_and_twist_pass_the_patch_test_without_hourglass() {
-    passes_the_patch_test(&[[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7]]);
+    for in_plane in IN_PLANE {
+        let corners = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7]];
+        passes_the_patch_test(&corners, in_plane);
+    }
 }
 
 #[test]
 fn triangles_between_quadrilaterals_pass_the_patch_test() {
-    passes_the_patch_test(&[
-        [0, 1, 5, 4],
-        [1, 2, 5, 5],
-        [5, 2, 6, 6],
-        [2, 3, 7, 6],
-        [3, 0, 4, 7],
-        [4, 5, 6, 6],
-        [6, 7, 4, 4],
-    ]);
+    let corners =
+        [[0, 1, 5, 4], [1, 2, 5, 5], [5, 2, 6, 6], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 6], [6, 7, 4, 4]];
+    IN_PLANE.into_iter().for_each(|in_plane| passes_the_patch_test(&corners, in_plane));
 }
 
-fn passes_the_patch_test(corners: &[[u32; 4]]) {
+fn passes_the_patch_test(corners: &[[u32; 4]], in_plane: InPlane) {
     // MacNeal and Harder's patch: 0.24 by 0.12, four inner nodes.
     let inner = [[0.04, 0.02], [0.18, 0.03], [0.16, 0.08], [0.08, 0.08]];
     let outer = [[0.0, 0.0], [0.24, 0.0], [0.24, 0.12], [0.0, 0.12]];
     let x: Vec<[f64; 3]> = outer.iter().chain(&inner).map(|p| [p[0], p[1], 0.0]).collect();
     let (young, poisson, h, dt) = (1e6, 0.25, 0.001, 1e-9);
     let (stretch, bend) = (1e-3, 1e-3);
-    let mut shells = Shells::new(&x, corners, h, Rule::Gauss(2), &material(young, poisson, 1000.0))
-        .expect("a sound section");
+    let plate = material(young, poisson, 1000.0);
+    let mut shells = shells((&x, corners), h, (in_plane, Rule::Gauss(2)), &plate);
     for (node, &[x, y, _]) in x.iter().enumerate() {
         // u = 1e-3 (x + y/2), v = 1e-3 (y + x/2), w = 1e-3 (x^2 + x y + y^2) / 2, rotations its slopes.
         let w = 0.5 * bend * (x * x + x * y + y * y);
@@ -174,7 +191,8 @@ fn passes_the_patch_test(corners: &[[u32; 4]]) {
     let z = 0.5 * h / 3f64.sqrt();
     let bending = -z * bend * young / (1.0 - poisson) * dt;
     for element in 0..corners.len() {
-        for (layer, side) in [(0, -1.0), (1, 1.0)] {
+        for layer in 0..2 * in_plane.points() {
+            let side = if layer % 2 == 0 { -1.0 } else { 1.0 };
             let [xx, yy, xy, yz, zx] = shells.stress(element, layer);
             let normal = membrane + side * bending;
             let sheared = (stretch * g - side * z * bend * g) * dt;
@@ -195,11 +213,11 @@ fn passes_the_patch_test(corners: &[[u32; 4]]) {
     }
 }
 
-fn stirred(width: Width, strength: Strength) -> (Shells, ElementVote) {
+fn stirred(width: Width, strength: Strength, in_plane: InPlane) -> (Shells, ElementVote) {
     let (x, corners) = warped();
     let mut steel = material(2e11, 0.3, 7800.0);
     steel.strength = strength;
-    let mut shells = Shells::new(&x, &corners, 0.05, Rule::Lobatto(5), &steel).expect("a sound section");
+    let mut shells = shells((&x, &corners), 0.05, (in_plane, Rule::Lobatto(5)), &steel);
     for node in 0..x.len() {
         let phase = node as f64;
         set(
@@ -273,13 +291,13 @@ fn hourglass_control_gives_back_no_more_than_it_has_taken() {
 
 #[test]
 fn every_lane_width_gives_the_same_bits() {
-    for strength in laws() {
-        let (scalar, vote) = stirred(Width::Scalar, strength);
+    for (strength, in_plane) in laws().into_iter().flat_map(|law| IN_PLANE.map(|in_plane| (law, in_plane))) {
+        let (scalar, vote) = stirred(Width::Scalar, strength, in_plane);
         assert!(vote.fault.is_none() && vote.internal > 0.0, "{vote:?}");
         let plastic = scalar.plastic_strain(3, 0);
         assert!(plastic > 0.0 || matches!(strength, Strength::Elastic { .. }), "{strength:?} never yields");
         for width in Width::ALL.into_iter().filter(|width| width.available()) {
-            let (wide, other) = stirred(width, strength);
+            let (wide, other) = stirred(width, strength, in_plane);
             assert_eq!(vote, other, "{width}");
             for (a, b) in [
                 (&scalar.x, &wide.x),
@@ -294,8 +312,8 @@ fn every_lane_width_gives_the_same_bits() {
 
 #[test]
 fn forces_add_to_zero_exactly_and_moments_to_rounding() {
-    for strength in laws() {
-        let (shells, _) = stirred(Width::best(), strength);
+    for (strength, in_plane) in laws().into_iter().flat_map(|law| IN_PLANE.map(|in_plane| (law, in_plane))) {
+        let (shells, _) = stirred(Width::best(), strength, in_plane);
         let mut total = [0.0; 3];
         let mut turning = [0.0; 3];
         let mut scale: f64 = 0.0;
@@ -331,9 +349,13 @@ fn strip() -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
 }
 
 fn vibrates_at_the_frequency_of_the_beam(x: &[[f64; 3]], corners: &[[u32; 4]]) {
+    IN_PLANE.into_iter().for_each(|in_plane| vibrates(x, corners, in_plane));
+}
+
+fn vibrates(x: &[[f64; 3]], corners: &[[u32; 4]], in_plane: InPlane) {
     // 0.2 by 0.01 by 0.002 m, 200 GPa, 8000 kg/m^3: 40.39 Hz as a beam, 42.34 Hz if the width could not curve.
     let steel = material(2e11, 0.3, 8000.0);
-    let mut shells = Shells::new(x, corners, 0.002, Rule::Gauss(2), &steel).expect("a sound section");
+    let mut shells = shells((x, corners), 0.002, (in_plane, Rule::Gauss(2)), &steel);
     let fixed: Vec<usize> = (0..3).map(|j| j * 41).collect();
     for node in 0..x.len() {
         let s = x[node][0] / 0.2;
@@ -356,7 +378,7 @@ fn vibrates_at_the_frequency_of_the_beam(x: &[[f64; 3]], corners: &[[u32; 4]]) {
         cycle += 1;
     }
     let frequency = 0.5 / (crossings[1] - crossings[0]);
-    println!("cantilever: {frequency:.3} Hz, 40.39 Hz");
+    println!("cantilever, {in_plane:?}: {frequency:.3} Hz, 40.39 Hz");
     assert!((frequency / 40.39 - 1.0).abs() < 0.02, "{frequency} Hz");
 }
 
@@ -369,8 +391,9 @@ fn the_twisted_beam_bends_as_published() {
     });
     let beam = material(29e6, 0.22, 2.5e-4);
     let fixed: Vec<usize> = (0..3).map(|j| j * 13).collect();
-    for (axis, published) in [(2, 5.424e-3), (1, 1.754e-3)] {
-        let mut shells = Shells::new(&x, &corners, 0.32, Rule::Gauss(5), &beam).expect("a sound section");
+    let loads = [(2, 5.424e-3), (1, 1.754e-3)];
+    for ((axis, published), in_plane) in loads.into_iter().flat_map(|load| IN_PLANE.map(|p| (load, p))) {
+        let mut shells = shells((&x, &corners), 0.32, (in_plane, Rule::Gauss(5)), &beam);
         let mut load = [0.0; 3];
         load[axis] = 1.0;
         let load: Vec<_> = [(12, 0.25), (25, 0.5), (38, 0.25)]
@@ -384,7 +407,7 @@ fn the_twisted_beam_bends_as_published() {
             kick(&mut shells, dt, 1500.0, &load, &fixed);
         }
         let found = shells.x[axis][25] - x[25][axis];
-        println!("twisted beam along axis {axis}: {found:.4e}, published {published:.4e}");
+        println!("twisted beam along axis {axis}, {in_plane:?}: {found:.4e}, published {published:.4e}");
         assert!((found / published - 1.0).abs() < 0.05, "axis {axis}: {found}, published {published}");
     }
 }

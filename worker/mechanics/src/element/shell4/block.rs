@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use super::{
-    Rule, SectionError, kernel, laminate,
+    InPlane, SectionError, kernel, laminate,
     layers::{LAYER, Layers, PLASTIC_STRAIN, TEMPERATURE},
+    plane::FOUR,
 };
 use crate::{
     element::{
@@ -17,7 +18,7 @@ use crate::{
     flip::Target,
     lanes::{SET, Width},
     material::Material,
-    mesh::{Section, laminate::direction, quad_area, twice},
+    mesh::{Section, quad_area, twice},
     spin::Turning,
     state::{N_FIELDS, field},
     strength::plane_stress::PlaneLaw,
@@ -43,26 +44,58 @@ pub(crate) struct Core {
     /// Area times thickness at the start.
     initial_volume: Vec<f64>,
     corners: [Vec<u32>; 4],
-    state: State,
+    pub(super) state: State,
     element_mass: Vec<f64>,
     alive: Vec<u8>,
     elements: Vec<u32>,
+    built: Built,
+    pub(super) law: Law,
+}
+
+/// What the section says of all elements.
+struct Built {
+    /// Heights and weights of the points through the thickness.
     points: Vec<(f64, f64)>,
+    in_plane: InPlane,
+    is_membrane: bool,
     /// Share of the strain across the thickness that this follows: 1, or 0 where it stays.
     thinning: f64,
     /// Plastic strain at which a layer breaks.
     breaks: Option<f64>,
-    law: Law,
+}
+
+impl Built {
+    /// Layers of all points in the plane.
+    fn n_layers(&self) -> usize {
+        self.points.len() * self.in_plane.points()
+    }
+
+    /// What the kernel is told, of layers of this law.
+    fn constants<W: Layers>(&self, law: W, step: &ShellStep) -> kernel::Constants<'_, W> {
+        kernel::Constants {
+            law,
+            points: &self.points,
+            thinning: self.thinning,
+            breaks: self.breaks,
+            is_membrane: self.is_membrane,
+            second_moment: self.points.iter().map(|(height, weight)| 0.25 * weight * height * height).sum(),
+            dt: step.dt,
+            force_magic: step.force_quantum.magic(),
+            moment_magic: step.moment_quantum.magic(),
+            inverse_arm: step.force_quantum.value() / step.moment_quantum.value(),
+            energy_magic: step.energy_quantum.magic(),
+        }
+    }
 }
 
 /// What the layers are made of.
-enum Law {
+pub(super) enum Law {
     Plain(PlaneLaw),
     Laminate(laminate::Stacked),
 }
 
 /// Numbers of the elements by slot. What a lane set has lies together, field after field: a cycle goes through memory once.
-struct State {
+pub(super) struct State {
     n_fields: usize,
     values: Vec<f64>,
 }
@@ -84,7 +117,7 @@ impl State {
         (slot / SET * self.n_fields + field) * SET + slot % SET
     }
 
-    fn at(&self, field: usize, slot: usize) -> f64 {
+    pub fn at(&self, field: usize, slot: usize) -> f64 {
         self.values[self.place(field, slot)]
     }
 
@@ -98,13 +131,13 @@ impl State {
 }
 
 /// The first field of a layer of a laminate.
-fn ply_field(point: usize) -> usize {
+pub(super) fn ply_field(point: usize) -> usize {
     kernel::ELEMENT + laminate::SHARED + point * laminate::BY_LAYER
 }
 
-/// The first field of any other layer.
-fn layer_field(point: usize) -> usize {
-    kernel::ELEMENT + point * LAYER
+/// The first field of any other layer; those of a point in the plane stand together.
+pub(super) fn layer_field(layer: usize) -> usize {
+    kernel::ELEMENT + layer * LAYER
 }
 
 /// Whether shells can be built of this: the points through the thickness and the law of the layers.
@@ -114,6 +147,12 @@ fn section_of(section: &Section, material: &Material) -> Result<(Vec<(f64, f64)>
         return Err(SectionError::Thickness { thickness });
     }
     let points = rule.points().ok_or(SectionError::Points { rule })?;
+    if section.is_membrane && (points.len() > 1 || section.laminate.is_some()) {
+        return Err(SectionError::Membrane);
+    }
+    if section.laminate.is_some() && section.in_plane != InPlane::One {
+        return Err(SectionError::InPlane);
+    }
     if let Some(laminate) = &section.laminate {
         let law = material.strength.layers().filter(|_| !material.is_gas());
         let law = law.ok_or_else(|| SectionError::Plies { material: material.name.clone() })?;
@@ -160,7 +199,7 @@ impl Core {
         let n_elements = quads.len();
         assert!(quads.iter().flatten().all(|&n| (n as usize) < n_nodes), "corners beyond {n_nodes} nodes");
         let n_fields = match law {
-            Law::Plain(_) => layer_field(points.len()),
+            Law::Plain(_) => layer_field(points.len() * section.in_plane.points()),
             Law::Laminate(_) => ply_field(points.len()),
         };
         assert!(fields.len() == n_fields, "{} fields of shells", fields.len());
@@ -181,10 +220,14 @@ impl Core {
                 .map(|set| (0..SET).map(|i| u8::from(set * SET + i < n_elements) << i).sum())
                 .collect(),
             elements: (0..n_slots).map(|slot| elements.get(slot).copied().unwrap_or(u32::MAX)).collect(),
-            points,
-            // Plies keep their thickness.
-            thinning: f64::from(section.thins && section.laminate.is_none()),
-            breaks: section.breaks,
+            built: Built {
+                points,
+                in_plane: section.in_plane,
+                is_membrane: section.is_membrane,
+                // Plies keep their thickness.
+                thinning: f64::from(section.thins && section.laminate.is_none()),
+                breaks: section.breaks,
+            },
             law,
         })
     }
@@ -196,20 +239,23 @@ impl Core {
         let area = quad_area(&corners.map(|n| std::array::from_fn(|axis| x[axis][n])));
         let volume = self.initial_volume[element];
         let mut fields = [0.0; N_FIELDS];
-        let n_points = self.points.len();
-        let mean_of =
-            |of: &dyn Fn(usize) -> f64| (0..n_points).map(|p| self.points[p].1 * of(p)).sum::<f64>();
+        let Built { points, in_plane, .. } = &self.built;
+        let n_layers = self.built.n_layers();
+        let mean_of = |of: &dyn Fn(usize) -> f64| {
+            let sum = (0..n_layers).map(|p| points[p % points.len()].1 * of(p)).sum::<f64>();
+            sum / in_plane.points() as f64
+        };
         let mean: [f64; 5] = match &self.law {
             Law::Plain(_) => {
                 let layer = |point: usize, i: usize| self.state.at(layer_field(point) + i, element);
-                let most = |i: usize| (0..n_points).map(|p| layer(p, i)).fold(f64::MIN, f64::max);
+                let most = |i: usize| (0..n_layers).map(|p| layer(p, i)).fold(f64::MIN, f64::max);
                 fields[field::PLASTIC_STRAIN] = most(PLASTIC_STRAIN);
                 fields[field::TEMPERATURE] = most(TEMPERATURE);
                 std::array::from_fn(|i| mean_of(&|point| layer(point, i)))
             }
             Law::Laminate(stacked) => {
                 fields[field::DAMAGE] = mean_of(&|point| self.ply(point, laminate::IS_GONE, element));
-                let stresses: Vec<[f64; 5]> = (0..n_points)
+                let stresses: Vec<[f64; 5]> = (0..n_layers)
                     .map(|point| {
                         stacked.stress(point, self.direction(element), |i| self.ply(point, i, element))
                     })
@@ -229,12 +275,12 @@ impl Core {
     }
 
     /// A number of a layer of a laminate.
-    fn ply(&self, point: usize, i: usize, element: usize) -> f64 {
+    pub(super) fn ply(&self, point: usize, i: usize, element: usize) -> f64 {
         self.state.at(ply_field(point) + i, element)
     }
 
     /// The direction of angle 0 of a laminate in the frame of an element.
-    fn direction(&self, element: usize) -> [f64; 2] {
+    pub(super) fn direction(&self, element: usize) -> [f64; 2] {
         [0, 1].map(|i| self.state.at(kernel::ELEMENT + i, element))
     }
 
@@ -251,7 +297,7 @@ impl Core {
     ///
     /// # Panics
     /// If node arrays are shorter than the nodes, a set is out of range or the machine lacks the width.
-    fn run(
+    pub(super) fn run(
         &mut self,
         nodes: Nodal<'_>,
         turning: &mut Turning,
@@ -280,42 +326,24 @@ impl Core {
             alive: &self.alive,
             elements: &self.elements,
         };
-        let (law, points) = (&self.law, self.points.as_slice());
-        let (thinning, breaks) = (self.thinning, self.breaks);
-        match law {
+        match &self.law {
             Law::Plain(law) => {
-                let c = constants(*law, points, (thinning, breaks), step);
+                let c = self.built.constants(*law, step);
                 // SAFETY: node arrays and sets were checked just now, corners when they were taken in, and arrays by slot were built
-                // in whole sets.
-                width.run(unsafe { kernel::Pass::new(view, &c, sets, vote) });
+                // in whole sets, with the layers of these points in the plane.
+                unsafe {
+                    match self.built.in_plane {
+                        InPlane::One => width.run(kernel::Pass::<_, 1>::new(view, &c, sets, vote)),
+                        InPlane::Four => width.run(kernel::Pass::<_, FOUR>::new(view, &c, sets, vote)),
+                    }
+                }
             }
             Law::Laminate(stacked) => {
-                let c = constants(stacked.stack(), points, (thinning, breaks), step);
-                // SAFETY: likewise.
-                width.run(unsafe { kernel::Pass::new(view, &c, sets, vote) });
+                let c = self.built.constants(stacked.stack(), step);
+                // SAFETY: likewise; a laminate has one point in the plane.
+                width.run(unsafe { kernel::Pass::<_, 1>::new(view, &c, sets, vote) });
             }
         }
-    }
-}
-
-/// What the kernel is told of a section of this law and these points.
-fn constants<'a, W: Layers>(
-    law: W,
-    points: &'a [(f64, f64)],
-    (thinning, breaks): (f64, Option<f64>),
-    step: &ShellStep,
-) -> kernel::Constants<'a, W> {
-    kernel::Constants {
-        law,
-        points,
-        thinning,
-        breaks,
-        second_moment: points.iter().map(|(height, weight)| 0.25 * weight * height * height).sum(),
-        dt: step.dt,
-        force_magic: step.force_quantum.magic(),
-        moment_magic: step.moment_quantum.magic(),
-        inverse_arm: step.force_quantum.value() / step.moment_quantum.value(),
-        energy_magic: step.energy_quantum.magic(),
     }
 }
 
@@ -397,7 +425,7 @@ impl Group for Core {
     fn met(&self, criteria: &Criteria, sets: &[Range<u32>]) -> Vec<u32> {
         if let Law::Laminate(_) = self.law {
             let is_gone = |&slot: &usize| {
-                (0..self.points.len()).all(|point| self.ply(point, laminate::IS_GONE, slot) >= 1.0)
+                (0..self.built.n_layers()).all(|point| self.ply(point, laminate::IS_GONE, slot) >= 1.0)
             };
             return match criteria.failure {
                 true => living(&self.alive, sets).filter(is_gone).map(|slot| slot as u32).collect(),
@@ -405,12 +433,12 @@ impl Group for Core {
             };
         }
         // What the layers break by; without that none has.
-        let Some(limit) = self.breaks.filter(|_| criteria.plastic_strain.is_some()) else {
+        let Some(limit) = self.built.breaks.filter(|_| criteria.plastic_strain.is_some()) else {
             return Vec::new();
         };
         let has_broken = |&slot: &usize| {
-            let strain = |point: usize| self.state.at(layer_field(point) + PLASTIC_STRAIN, slot);
-            (0..self.points.len()).all(|point| strain(point) >= limit)
+            let strain = |layer: usize| self.state.at(layer_field(layer) + PLASTIC_STRAIN, slot);
+            (0..self.built.n_layers()).all(|layer| strain(layer) >= limit)
         };
         living(&self.alive, sets).filter(has_broken).map(|slot| slot as u32).collect()
     }
@@ -431,154 +459,5 @@ impl Group for Core {
             Target::Layers => self.state.sets_mut().map(|[_, layers]| layers).collect(),
             _ => Vec::new(),
         }
-    }
-}
-
-/// Shells of one material and thickness with nodes of their own, for whoever drives them without a cycle. Node arrays are
-/// by local node.
-pub struct Shells {
-    /// Position `x_n` by axis.
-    pub x: [Vec<f64>; 3],
-    /// Velocity `v_{n-1/2}` by axis.
-    pub v: [Vec<f64>; 3],
-    /// Nodal force by axis.
-    pub f: [Vec<f64>; 3],
-    /// Nodal mass: a quarter of each element's.
-    pub mass: Vec<f64>,
-    /// Rotations of the nodes.
-    pub turning: Turning,
-    core: Core,
-}
-
-impl Shells {
-    /// Shells at rest and free of stress; corners run around the element, seen from its upper side to the left.
-    ///
-    /// # Errors
-    /// [`SectionError`].
-    ///
-    /// # Panics
-    /// If there is no element or a corner is no node.
-    pub fn new(
-        x: &[[f64; 3]],
-        corners: &[[u32; 4]],
-        thickness: f64,
-        rule: Rule,
-        material: &Material,
-    ) -> Result<Shells, SectionError> {
-        let section = Section { thickness, rule, thins: true, breaks: None, laminate: None };
-        Self::of(x, corners, &section, material)
-    }
-
-    /// The same of any section.
-    ///
-    /// # Errors
-    /// [`SectionError`], also where the axis of a laminate has no part in the plane of an element.
-    ///
-    /// # Panics
-    /// As [`Shells::new`].
-    pub fn of(
-        x: &[[f64; 3]],
-        corners: &[[u32; 4]],
-        section: &Section,
-        material: &Material,
-    ) -> Result<Shells, SectionError> {
-        section.check(material)?;
-        let thickness = section.thickness;
-        let (n_nodes, n_elements) = (x.len(), corners.len());
-        let n_padded = n_nodes.next_multiple_of(SET);
-        let mut inertia = vec![0.0; n_nodes];
-        let mut fields = vec![vec![0.0; n_elements]; section.n_fields()];
-        fields[kernel::THICKNESS].fill(thickness);
-        for layer in fields[kernel::ELEMENT..].chunks_mut(LAYER) {
-            layer[TEMPERATURE].fill(material.initial_temperature());
-        }
-        if let Some(laminate) = &section.laminate {
-            fields.resize(ply_field(section.n_layers()), vec![0.0; n_elements]);
-            for (e, corners) in corners.iter().enumerate() {
-                let x = corners.map(|n| x[n as usize]);
-                let direction =
-                    direction(laminate.axis, material, &x).ok_or(SectionError::Axis { element: e })?;
-                for (field, along) in fields[kernel::ELEMENT..].iter_mut().zip(direction) {
-                    field[e] = along;
-                }
-            }
-        }
-        let mut masses = vec![0.0; n_padded];
-        masses[n_nodes..].fill(1.0);
-        let mut volumes = Vec::with_capacity(n_elements);
-        for corners in corners {
-            let area = quad_area(&corners.map(|n| x[n as usize]));
-            let mass = material.density * area * thickness;
-            volumes.push(area * thickness);
-            for &node in corners {
-                masses[node as usize] += 0.25 * mass;
-                inertia[node as usize] += 0.25 * mass * (thickness * thickness / 12.0).max(area / 8.0);
-            }
-        }
-        let elements: Vec<u32> = (0..n_elements as u32).collect();
-        let zeros = || std::array::from_fn(|_| vec![0.0; n_padded]);
-        Ok(Shells {
-            x: std::array::from_fn(|axis| {
-                let mut x: Vec<f64> = x.iter().map(|x| x[axis]).collect();
-                x.resize(n_padded, 0.0);
-                x
-            }),
-            v: zeros(),
-            f: zeros(),
-            mass: masses,
-            turning: Turning::new(&vec![[0.0; 3]; n_nodes], inertia),
-            core: Core::new(corners, n_nodes, &elements, &volumes, &fields, section, material)?,
-        })
-    }
-
-    pub fn n_elements(&self) -> usize {
-        self.core.n_elements
-    }
-
-    /// Thickness of an element now (length).
-    pub fn thickness(&self, element: usize) -> f64 {
-        self.core.state.at(kernel::THICKNESS, element)
-    }
-
-    /// Energy that hourglass control has taken from an element since the start.
-    pub fn hourglass_energy(&self, element: usize) -> f64 {
-        self.core.state.at(kernel::HOURGLASS, element)
-    }
-
-    /// Stress of a layer in the frame of its element, xx, yy, xy, yz, zx, counted from below.
-    pub fn stress(&self, element: usize, layer: usize) -> [f64; 5] {
-        let core = &self.core;
-        match &core.law {
-            Law::Plain(_) => std::array::from_fn(|i| core.state.at(layer_field(layer) + i, element)),
-            Law::Laminate(stacked) => {
-                stacked.stress(layer, core.direction(element), |i| core.ply(layer, i, element))
-            }
-        }
-    }
-
-    /// The history variables of an element of a laminate: the direction of angle 0, then those of each layer.
-    pub fn variables(&self, element: usize) -> Vec<f64> {
-        self.core.variables(element)
-    }
-
-    /// Effective plastic strain of a layer.
-    pub fn plastic_strain(&self, element: usize, layer: usize) -> f64 {
-        self.core.state.at(layer_field(layer) + PLASTIC_STRAIN, element)
-    }
-
-    /// Sets forces and moments to zero, adds those of all elements at `x_n`, brings their state from `n-1` to `n` and
-    /// answers their votes. The result does not depend on `width`.
-    ///
-    /// # Panics
-    /// If node arrays changed their length or the machine lacks the width.
-    pub fn compute(&mut self, step: &ShellStep, width: Width) -> ElementVote {
-        for array in self.f.iter_mut().chain(&mut self.turning.m) {
-            array.fill(0.0);
-        }
-        let mut vote = ElementVote::default();
-        let all = 0..self.core.alive.len() as u32;
-        let nodes = Nodal::of(&self.x, &self.v, &mut self.f);
-        self.core.run(nodes, &mut self.turning, &[all], step, width, &mut vote);
-        vote
     }
 }

@@ -31,7 +31,8 @@ pub(super) struct Geometry<L> {
     pub py: [L; 4],
     /// The hourglass pattern is 1/4, -1/4, 1/4, -1/4 less this: then it is orthogonal to linear fields.
     pub lean: Opposed<L>,
-    /// The pattern's moment of the height z.
+    /// The part of the warp in the plane, and the pattern's moment of the height z: the part across it.
+    pub warp: [L; 2],
     pub gz: L,
     /// Moments of x x, x y and y y of the pattern, of `bx` and of `by`: what they see of a curved deflection.
     pub curved: [[L; 3]; 3],
@@ -95,7 +96,22 @@ impl<L: Lane> Geometry<L> {
         let cy = [-(second * bx[1]), -(first * bx[0])];
 
         let curved = curved(&[tx, ty], &[dx, dy], &[rx, ry], inverse_area);
-        Self { e: [e1, e2, e3], area, inverse_area, bx, by, cx, cy, px, py, lean, gz: rz, curved, least }
+        Self {
+            e: [e1, e2, e3],
+            area,
+            inverse_area,
+            bx,
+            by,
+            cx,
+            cy,
+            px,
+            py,
+            lean,
+            warp: [rx, ry],
+            gz: rz,
+            curved,
+            least,
+        }
     }
 
     /// `sum bx_I bx_I`, `sum by_I by_I` and the largest eigenvalue of the sum of dyads.

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use super::{
     geometry::{Geometry, Opposed, dot},
-    layers::{Layers, Resultants, Strains, hooke, scaled, sum},
+    layers::{Layers, Resultants, Strains, sum},
+    plane::{self, PATTERNS},
 };
 use crate::{
     element::{ElementVote, Fault, vector::Vector},
@@ -38,7 +39,7 @@ pub(super) struct View<'a> {
     pub w: [&'a [f64]; 3],
     pub f: [&'a mut [f64]; 3],
     pub m: [&'a mut [f64]; 3],
-    /// By lane set: `ELEMENT` fields, then those of the layers.
+    /// By lane set: `ELEMENT` fields, then those of the layers of each point in the plane.
     pub state: &'a mut [f64],
     pub mass: &'a [f64],
     pub alive: &'a [u8],
@@ -54,6 +55,8 @@ pub(super) struct Constants<'a, W> {
     pub thinning: f64,
     /// Plastic strain at which a layer breaks.
     pub breaks: Option<f64>,
+    /// Whether the section is a membrane, which neither bends nor shears across its thickness.
+    pub is_membrane: bool,
     /// Mean square of the heights of the points over the square of the thickness: 1/12, and 0 of one point.
     pub second_moment: f64,
     pub dt: f64,
@@ -64,15 +67,23 @@ pub(super) struct Constants<'a, W> {
     pub energy_magic: f64,
 }
 
-/// The elements of some sets.
-pub(super) struct Pass<'a, W> {
+impl<W> Constants<'_, W> {
+    /// Stiffness against shear across the thickness, of a material with this shear modulus.
+    #[inline(always)]
+    pub fn transverse(&self, modulus: f64) -> f64 {
+        if self.is_membrane { 0.0 } else { SHEAR * modulus }
+    }
+}
+
+/// The elements of some sets, with `P` points in the plane.
+pub(super) struct Pass<'a, W, const P: usize> {
     view: View<'a>,
     constants: &'a Constants<'a, W>,
     sets: &'a [Range<u32>],
     vote: &'a mut ElementVote,
 }
 
-impl<'a, W: Layers> Pass<'a, W> {
+impl<'a, W: Layers, const P: usize> Pass<'a, W, P> {
     /// # Safety
     /// As [`compute`].
     pub unsafe fn new(
@@ -85,7 +96,7 @@ impl<'a, W: Layers> Pass<'a, W> {
     }
 }
 
-impl<W: Layers> Task for Pass<'_, W> {
+impl<W: Layers, const P: usize> Task for Pass<'_, W, P> {
     type Output = ();
 
     #[inline(always)]
@@ -94,7 +105,7 @@ impl<W: Layers> Task for Pass<'_, W> {
         let Self { mut view, constants, sets, vote } = self;
         let (constants, mut own) = (*constants, *vote);
         // SAFETY: whoever made the pass has promised it.
-        unsafe { compute::<L, W>(&mut view, &constants, sets, &mut own) }
+        unsafe { compute::<L, W, P>(&mut view, &constants, sets, &mut own) }
         *vote = own;
     }
 }
@@ -104,7 +115,7 @@ impl<W: Layers> Task for Pass<'_, W> {
 /// # Safety
 /// Every array by slot holds all sets of the ranges, and every corner is inside the node arrays.
 #[inline(always)]
-unsafe fn compute<L: Lane, W: Layers>(
+unsafe fn compute<L: Lane, W: Layers, const P: usize>(
     view: &mut View<'_>,
     c: &Constants<'_, W>,
     sets: &[Range<u32>],
@@ -114,7 +125,7 @@ unsafe fn compute<L: Lane, W: Layers>(
         let mut slot = range.start as usize * SET;
         while slot < range.end as usize * SET {
             // SAFETY: handed on from the caller.
-            unsafe { slots::<L, W>(view, c, slot, vote) };
+            unsafe { slots::<L, W, P>(view, c, slot, vote) };
             slot += L::N;
         }
     }
@@ -145,7 +156,7 @@ unsafe fn gather<L: Lane>(view: &View<'_>, from: &[&[f64]; 3], slot: usize) -> [
 /// # Safety
 /// As [`compute`].
 #[inline(always)]
-unsafe fn slots<L: Lane, W: Layers>(
+unsafe fn slots<L: Lane, W: Layers, const P: usize>(
     view: &mut View<'_>,
     c: &Constants<'_, W>,
     slot: usize,
@@ -165,7 +176,7 @@ unsafe fn slots<L: Lane, W: Layers>(
     };
     let alive = L::mask(u32::from(view.alive[slot / SET]) >> (slot % SET));
     let lane = slot % SET;
-    let n_numbers = (ELEMENT + W::SHARED + c.points.len() * W::BY_LAYER) * SET;
+    let n_numbers = (ELEMENT + P * (W::SHARED + c.points.len() * W::BY_LAYER)) * SET;
     let (own, of_layers) = view.state[slot / SET * n_numbers..][..n_numbers].split_at_mut(ELEMENT * SET);
     let mut state = [zero; ELEMENT];
     let mut i = 0;
@@ -226,38 +237,23 @@ unsafe fn slots<L: Lane, W: Layers>(
 
     // 2. Stress of the layers, thinning, energy.
     let [young, poisson, g_modulus] = c.law.moduli();
-    let plate = young / (1.0 - poisson * poisson);
-    let (stiff, coupled) = (L::splat(plate), L::splat(plate * poisson));
-    let (shear, transverse) = (L::splat(g_modulus), L::splat(SHEAR * g_modulus));
     let strains = Strains { membrane, curvature, shear: [shear_y, shear_x] };
-    let growth = Strains {
-        membrane: hooke(stiff, coupled, shear, &membrane),
-        curvature: hooke(stiff, coupled, shear, &curvature),
-        shear: [transverse * shear_y, transverse * shear_x],
-    };
-    // SAFETY: slots are inside.
-    let (before, after, elastic) = unsafe { W::update(of_layers, c, lane, alive, h, &strains, &growth) };
-    let power = half * before.plus(&after).power(&strains);
-    // Strain across the thickness: its elastic part by Hooke, its plastic part keeps the volume.
-    let rise = (after.n[0] - before.n[0]) + (after.n[1] - before.n[1]);
-    let thinning = L::splat((1.0 - 2.0 * poisson) / young).mul_add(rise, -(dt * (membrane[0] + membrane[1])));
-
-    // 3. Viscous stress of the section.
     let lag = L::splat(DAMPING) * dt;
-    let squares = L::splat(c.second_moment) * h * h;
-    let viscous = Resultants {
-        n: scaled(lag, &growth.membrane),
-        m: scaled(lag * squares, &growth.curvature),
-        q: [lag * growth.shear[0], lag * growth.shear[1]],
-    };
-    let damped = viscous.power(&strains);
-    let Resultants { n: [n_xx, n_yy, n_xy], m: [m_xx, m_yy, m_xy], q: [q_y, q_x] } = after.plus(&viscous);
+    let patterns = [rates[0], rates[1], rates[2], rates[3]];
+    // SAFETY: slots are inside.
+    let answer =
+        unsafe { plane::update::<L, W, P>(of_layers, c, (lane, alive), (h, lag), &strains, &patterns, &g) };
+    let (power, damped) = (answer.power, answer.damped);
+    // Strain across the thickness: its elastic part by Hooke, its plastic part keeps the volume.
+    let thinning =
+        L::splat((1.0 - 2.0 * poisson) / young).mul_add(answer.rise, -(dt * (membrane[0] + membrane[1])));
 
-    // 4. Hourglass forces grow with their patterns, more softly where layers yield.
+    // 3. Hourglass forces grow with their patterns, more softly where layers yield.
     let (bxx, byy, largest) = g.squares();
     let h3 = h * h * h;
     let membrane_k = L::splat(4.0 / 3.0 * young) * h * g.area;
-    let bending_k = L::splat(young / 9.0) * h3 * g.area;
+    let plate = if c.is_membrane { 0.0 } else { 1.0 };
+    let bending_k = L::splat(plate * young / 9.0) * h3 * g.area;
     let shear_k = L::splat(SHEAR * g_modulus) * h3;
     let stiffness = [
         membrane_k * bxx,
@@ -265,12 +261,13 @@ unsafe fn slots<L: Lane, W: Layers>(
         bending_k * byy,
         bending_k * bxx,
         L::splat(8.0 / 3.0) * shear_k * g.inverse_area,
-        L::splat(1.0 / 24.0) * shear_k * g.area,
+        L::splat(plate / 24.0) * shear_k * g.area,
     ];
-    let share = elastic.max(L::splat(SOFT));
+    let share = answer.elastic.max(L::splat(SOFT));
     let (mut hourglass_power, mut hourglass_damped) = (zero, zero);
     let mut resisting = [zero; 6];
-    let mut pattern = 0;
+    // Those that points in the plane see are no hourglass.
+    let mut pattern = if P == 1 { 0 } else { PATTERNS };
     while pattern < 6 {
         let (old, rate) = (state[pattern], rates[pattern]);
         let rise = stiffness[pattern] * rate;
@@ -291,7 +288,7 @@ unsafe fn slots<L: Lane, W: Layers>(
     state[THICKNESS] = h * (one + L::splat(c.thinning) * thinning);
     let h = state[THICKNESS];
 
-    // 5. Forces and moments on the geometry of now, conjugate to the rates above.
+    // 4. Forces and moments on the geometry of now, conjugate to the rates above.
     let g = Geometry::of(&x);
     let [e1, e2, e3] = g.e;
     let volume = h * g.area;
@@ -299,6 +296,15 @@ unsafe fn slots<L: Lane, W: Layers>(
     let finite = (power + state[INTERNAL]).abs().less(L::splat(f64::MAX));
     let computed = L::both(alive, finite);
     let faults = L::bits(alive) & (L::bits(flat) | !L::bits(finite));
+    let Resultants { n: [n_xx, n_yy, n_xy], m: [m_xx, m_yy, m_xy], q: [q_y, q_x] } = answer.whole(&g);
+    if P > 1 {
+        let seen = answer.on_patterns(&g, h, poisson);
+        let mut pattern = 0;
+        while pattern < PATTERNS {
+            resisting[pattern] = seen[pattern];
+            pattern += 1;
+        }
+    }
     let [hx, hy, hwx, hwy, hq, ht] = resisting;
     // Deflection forces on the curvatures xx, xy and yy.
     let mut bent = [zero; 3];
@@ -357,7 +363,7 @@ unsafe fn slots<L: Lane, W: Layers>(
         i += 1;
     }
 
-    // 6. Rounding, scatter, votes.
+    // 5. Rounding, scatter, votes.
     let (force_magic, moment_magic) = (L::splat(c.force_magic), L::splat(c.moment_magic));
     let mut bound = zero;
     let mut turning = zero;
@@ -394,6 +400,7 @@ unsafe fn slots<L: Lane, W: Layers>(
         i += 1;
     }
     // The membrane wave with the mass that the element has: c^2 = plate stiffness * volume / mass.
+    let largest = if P == 1 { largest } else { plane::largest(&g, largest) };
     let courant = (mass / (L::splat(c.law.wave()) * volume * largest)).sqrt().to_array();
     let energy_magic = L::splat(c.energy_magic);
     let internal = L::select(computed, state[INTERNAL], zero);

@@ -178,6 +178,18 @@ impl<L: Lane> Resultants<L> {
         self.q = [weight.mul_add(stress.yz, self.q[0]), weight.mul_add(stress.zx, self.q[1])];
     }
 
+    /// Adds a share of others.
+    #[inline(always)]
+    pub fn add_share(&mut self, share: L, other: &Self) {
+        let mut i = 0;
+        while i < 3 {
+            self.n[i] = share.mul_add(other.n[i], self.n[i]);
+            self.m[i] = share.mul_add(other.m[i], self.m[i]);
+            i += 1;
+        }
+        self.q = [share.mul_add(other.q[0], self.q[0]), share.mul_add(other.q[1], self.q[1])];
+    }
+
     #[inline(always)]
     pub fn plus(&self, other: &Self) -> Self {
         let mut both = *self;

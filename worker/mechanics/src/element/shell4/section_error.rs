@@ -31,6 +31,10 @@ pub enum SectionError {
     },
     /// The plies make no laminate.
     Laminate(LaminateError),
+    /// A membrane of several points through the thickness, or of plies.
+    Membrane,
+    /// Plies with several points in the plane.
+    InPlane,
     /// The axis of the plies has no part in the plane of an element.
     Axis { element: usize },
 }
@@ -53,6 +57,12 @@ impl fmt::Display for SectionError {
                     f,
                     "no rule {rule:?} through the thickness; take Gauss with 1 to 5 points or Lobatto with 3 to 5"
                 )
+            }
+            SectionError::Membrane => {
+                write!(f, "a membrane of several points or plies; give it one point and no plies")
+            }
+            SectionError::InPlane => {
+                write!(f, "a composite with four points in its plane; take one, with hourglass control")
             }
             SectionError::Law { material, law } => write!(
                 f,

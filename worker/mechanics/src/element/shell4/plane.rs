@@ -1,0 +1,237 @@
+//! The points in the plane of a shell: one with hourglass control, or four that see every motion that strains the element.
+//!
+//! With four points (Gauss's, two by two) the patterns that one point does not see strain them: at a point the derivatives
+//! `h_x`, `h_y` of `h = xi eta` times the rate of a pattern. In the plane and for the curvatures alike, with the rates `r_x`, `r_y` of the
+//! patterns,
+//!
+//! `d_xx = h_x r_x - nu h_y r_y`, `d_yy = h_y r_y - nu h_x r_x`, `d_xy = 0`:
+//!
+//! the assumed strain of Belytschko and Bachrach (1986), with which an element bends in its plane as a beam does and does not lock. Nodal forces are the
+//! exact conjugates. Over the element `h_x` and `h_y` have no mean, so constant strain and constant curvature leave the patterns at rest.
+
+use super::{
+    geometry::Geometry,
+    kernel::Constants,
+    layers::{Layers, Resultants, Strains, hooke, scaled},
+};
+use crate::lanes::{Lane, SET};
+
+/// Gauss's points of two by two.
+pub(super) const FOUR: usize = 4;
+/// Their coordinates `xi`, `eta`.
+const PLACES: [[f64; 2]; FOUR] = [[-NEAR, -NEAR], [NEAR, -NEAR], [NEAR, NEAR], [-NEAR, NEAR]];
+/// 1 / sqrt(3).
+const NEAR: f64 = 0.577_350_269_189_625_8;
+
+/// A point in the plane.
+#[derive(Clone, Copy)]
+struct Point<L> {
+    /// Its share of the area.
+    share: L,
+    /// The derivatives of `xi eta` along x and y, times the area that belongs to this point.
+    hx: L,
+    hy: L,
+}
+
+/// The points of an element in one configuration.
+struct Points<L> {
+    /// `dx/dxi`, `dy/dxi`, `dx/deta`, `dy/deta` in the middle.
+    along_xi: [L; 2],
+    along_eta: [L; 2],
+    /// The Jacobian is 1 plus this times `xi` and `eta`, over that in the middle.
+    skew: [L; 2],
+}
+
+impl<L: Lane> Points<L> {
+    #[inline(always)]
+    fn of(g: &Geometry<L>) -> Self {
+        let half = L::splat(0.5);
+        // Half the diagonals, from corner 0 to 2 and from 3 to 1.
+        let (t, d) = ([-(g.by[1] * g.area), g.bx[1] * g.area], [-(g.by[0] * g.area), g.bx[0] * g.area]);
+        let along_xi = [half * (t[0] + d[0]), half * (t[1] + d[1])];
+        let along_eta = [half * (t[0] - d[0]), half * (t[1] - d[1])];
+        let [rx, ry] = g.warp;
+        // Four over the area is one over the Jacobian in the middle.
+        let inverse = L::splat(4.0) * g.inverse_area;
+        let skew = [
+            inverse * along_xi[1].neg_mul_add(rx, along_xi[0] * ry),
+            inverse * along_eta[0].neg_mul_add(ry, along_eta[1] * rx),
+        ];
+        Self { along_xi, along_eta, skew }
+    }
+
+    #[inline(always)]
+    fn at(&self, point: usize) -> Point<L> {
+        let [xi, eta] = [L::splat(PLACES[point][0]), L::splat(PLACES[point][1])];
+        let quarter = L::splat(0.25);
+        let jacobian = xi.mul_add(self.skew[0], eta.mul_add(self.skew[1], L::splat(1.0)));
+        Point {
+            share: quarter * jacobian,
+            hx: xi.neg_mul_add(self.along_xi[1], eta * self.along_eta[1]),
+            hy: eta.neg_mul_add(self.along_eta[0], xi * self.along_xi[0]),
+        }
+    }
+}
+
+/// What the sections at the points of an element give in a step.
+pub(super) struct Answer<L, const P: usize> {
+    /// By point the sums of the stress after the step, with the viscous part.
+    after: [Resultants<L>; P],
+    /// Power of the stress, and of its viscous part, over the volume.
+    pub power: L,
+    pub damped: L,
+    /// By what `n_xx + n_yy` rises in the step.
+    pub rise: L,
+    /// Share of the section that is elastic.
+    pub elastic: L,
+}
+
+/// Patterns that four points see: of velocities along x and y, and of rotations about x and y.
+pub(super) const PATTERNS: usize = 4;
+
+impl<L: Lane, const P: usize> Answer<L, P> {
+    /// The sums of the whole section with the viscous part, on the geometry of now.
+    #[inline(always)]
+    pub fn whole(&self, g: &Geometry<L>) -> Resultants<L> {
+        if P == 1 {
+            return self.after[0];
+        }
+        let points = Points::of(g);
+        let mut whole = Resultants::none();
+        let mut p = 0;
+        while p < P {
+            whole.add_share(points.at(p).share, &self.after[p]);
+            p += 1;
+        }
+        whole
+    }
+
+    /// The forces on the patterns that the points see, on the geometry of now, of shells of this thickness.
+    #[inline(always)]
+    pub fn on_patterns(&self, g: &Geometry<L>, h: L, poisson: f64) -> [L; PATTERNS] {
+        let points = Points::of(g);
+        let across = L::splat(poisson);
+        let [mut x, mut y, mut about_x, mut about_y] = [L::splat(0.0); PATTERNS];
+        let mut p = 0;
+        while p < P {
+            let Point { hx, hy, .. } = points.at(p);
+            let Resultants { n: [n_xx, n_yy, _], m: [m_xx, m_yy, _], .. } = self.after[p];
+            x = hx.mul_add(across.neg_mul_add(n_yy, n_xx), x);
+            y = hy.mul_add(across.neg_mul_add(n_xx, n_yy), y);
+            about_x = hy.neg_mul_add(across.neg_mul_add(m_xx, m_yy), about_x);
+            about_y = hx.mul_add(across.neg_mul_add(m_yy, m_xx), about_y);
+            p += 1;
+        }
+        [h * x, h * y, h * about_x, h * about_y]
+    }
+}
+
+/// What stands for the greatest square of the gradients where points see the patterns too: theirs may be greater in an element that is far
+/// from a parallelogram.
+#[inline(always)]
+pub(super) fn largest<L: Lane>(g: &Geometry<L>, of_gradients: L) -> L {
+    let points = Points::of(g);
+    let mut sum = L::splat(0.0);
+    let mut p = 0;
+    while p < FOUR {
+        let Point { share, hx, hy } = points.at(p);
+        sum = sum + hx.mul_add(hx, hy * hy) / share;
+        p += 1;
+    }
+    // A pattern has the length 1/2: its stiffness on four quarters of the mass.
+    of_gradients.max(L::splat(0.25) * g.inverse_area * g.inverse_area * sum)
+}
+
+/// Brings the layers of all points from `n-1` to `n`. `strains` are those of the middle, `rates` of the patterns, `g` the geometry in
+/// the middle of the step, `lag` the time within which rates of strain give the viscous stress.
+///
+/// # Safety
+/// As [`Layers::update`], of the layers of all `P` points, those of a point together.
+#[inline(always)]
+pub(super) unsafe fn update<L: Lane, W: Layers, const P: usize>(
+    layers: &mut [f64],
+    c: &Constants<'_, W>,
+    (lane, alive): (usize, L::Mask),
+    (h, lag): (L, L),
+    strains: &Strains<L>,
+    rates: &[L; PATTERNS],
+    g: &Geometry<L>,
+) -> Answer<L, P> {
+    let zero = L::splat(0.0);
+    let half = L::splat(0.5);
+    let [young, poisson, g_modulus] = c.law.moduli();
+    let plate = young / (1.0 - poisson * poisson);
+    let (stiff, coupled) = (L::splat(plate), L::splat(plate * poisson));
+    let (shear, transverse) = (L::splat(g_modulus), L::splat(c.transverse(g_modulus)));
+    let squares = L::splat(c.second_moment) * h * h;
+    let mut answer =
+        Answer { after: [Resultants::none(); P], power: zero, damped: zero, rise: zero, elastic: zero };
+    let points = (P > 1).then(|| Points::of(g));
+    let n_numbers = (W::SHARED + c.points.len() * W::BY_LAYER) * SET;
+    let mut p = 0;
+    while p < P {
+        let at = points.as_ref().map(|points| points.at(p));
+        let strains = match &at {
+            Some(at) => strained(strains, rates, at, g, poisson),
+            None => *strains,
+        };
+        let growth = Strains {
+            membrane: hooke(stiff, coupled, shear, &strains.membrane),
+            curvature: hooke(stiff, coupled, shear, &strains.curvature),
+            shear: [transverse * strains.shear[0], transverse * strains.shear[1]],
+        };
+        let of_point = &mut layers[p * n_numbers..][..n_numbers];
+        // SAFETY: handed on from the caller.
+        let (before, after, elastic) = unsafe { W::update(of_point, c, lane, alive, h, &strains, &growth) };
+        let viscous = Resultants {
+            n: scaled(lag, &growth.membrane),
+            m: scaled(lag * squares, &growth.curvature),
+            q: [lag * growth.shear[0], lag * growth.shear[1]],
+        };
+        let power = half * before.plus(&after).power(&strains);
+        let damped = viscous.power(&strains);
+        let rise = (after.n[0] - before.n[0]) + (after.n[1] - before.n[1]);
+        answer.after[p] = after.plus(&viscous);
+        match &at {
+            Some(Point { share, .. }) => {
+                answer.power = share.mul_add(power, answer.power);
+                answer.damped = share.mul_add(damped, answer.damped);
+                answer.rise = share.mul_add(rise, answer.rise);
+                answer.elastic = share.mul_add(elastic, answer.elastic);
+            }
+            None => {
+                (answer.power, answer.damped, answer.rise, answer.elastic) = (power, damped, rise, elastic);
+            }
+        }
+        p += 1;
+    }
+    answer
+}
+
+/// The rates of strain at a point: those in the middle and what the patterns add.
+#[inline(always)]
+fn strained<L: Lane>(
+    middle: &Strains<L>,
+    [rx, ry, about_x, about_y]: &[L; PATTERNS],
+    at: &Point<L>,
+    g: &Geometry<L>,
+    poisson: f64,
+) -> Strains<L> {
+    let inverse = g.inverse_area / at.share;
+    let (hx, hy) = (at.hx * inverse, at.hy * inverse);
+    let across = L::splat(poisson);
+    let (x, y) = (hx * *rx, hy * *ry);
+    // A rotation about y moves what is above the middle along x, one about x moves it against y.
+    let (bent_x, bent_y) = (hx * *about_y, -(hy * *about_x));
+    let [xx, yy, xy] = middle.membrane;
+    let [bent_xx, bent_yy, bent_xy] = middle.curvature;
+    Strains {
+        membrane: [xx + across.neg_mul_add(y, x), yy + across.neg_mul_add(x, y), xy],
+        curvature: [
+            bent_xx + across.neg_mul_add(bent_y, bent_x),
+            bent_yy + across.neg_mul_add(bent_x, bent_y),
+            bent_xy,
+        ],
+        shear: middle.shear,
+    }
+}
