@@ -12,6 +12,7 @@ pub(crate) mod joint;
 mod output;
 mod part;
 mod shape;
+mod shell;
 
 use toml::de::DeTable;
 

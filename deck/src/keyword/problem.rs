@@ -2,7 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use mechanics::{element::beam2::BeamSection, mesh::Ply};
+use mechanics::{
+    element::{beam2::BeamSection, shell4::InPlane},
+    mesh::Ply,
+};
 
 use super::{
     blast::Blasts,
@@ -91,6 +94,9 @@ pub(super) struct ShellSection {
     pub(super) points: u32,
     /// Whether they are Lobatto's, else Gauss's.
     pub(super) lobatto: bool,
+    /// Points in the plane; one of a composite.
+    pub(super) in_plane: InPlane,
+    pub(super) is_membrane: bool,
     /// Of a composite the angle at each point (degrees).
     pub(super) angles: Vec<f64>,
     /// Of a composite its plies from below, by angle and thickness.

@@ -1,6 +1,9 @@
 //! `*PART`, `*SECTION_` of solids and shells, and `*HOURGLASS`.
 
-use mechanics::mesh::{MAX_LAYERS, Ply};
+use mechanics::{
+    element::shell4::InPlane,
+    mesh::{MAX_LAYERS, Ply},
+};
 
 use super::{
     cards::{Block, Card},
@@ -66,13 +69,8 @@ pub(super) fn read_composite(problem: &mut Problem, block: &Block<'_>, context: 
         return;
     };
     let f = context.fields(card, block.width, &TENS);
-    match f.integer(1) {
-        0 | 2 => {}
-        form @ (-16 | 1 | 3 | 4 | 6..=8 | 10 | 11 | 16..=18 | 20 | 21 | 25..=27) => context.log.warn(
-            card.at,
-            format!("ELFORM {form}: shells are computed with one point and hourglass control, as ELFORM 2 with warping"),
-        ),
-        _ => f.fault(1, "ELFORM 2", "take the shell of Belytschko, Lin and Tsay"),
+    if shell_form(&f, true, context).is_some_and(|(_, is_membrane)| is_membrane) {
+        f.fault(1, "shells that bend: a membrane has no plies", "take ELFORM 2");
     }
     for (i, expected) in [
         (3, "no NLOC: nodes in the middle of the thickness"),
@@ -113,7 +111,15 @@ pub(super) fn read_composite(problem: &mut Problem, block: &Block<'_>, context: 
     // A section of its own, by a number that no card can give.
     let section = u32::MAX - id;
     let thickness = layers.iter().map(|ply: &Ply| ply.share).sum();
-    let shell = ShellSection { thickness, points: 1, lobatto: false, angles: Vec::new(), plies: layers };
+    let shell = ShellSection {
+        thickness,
+        points: 1,
+        lobatto: false,
+        in_plane: InPlane::One,
+        is_membrane: false,
+        angles: Vec::new(),
+        plies: layers,
+    };
     problem.sections.insert(section, (card.at, Section::Shell(shell)));
     let part = PartCard {
         at: card.at,
@@ -152,20 +158,43 @@ pub(super) fn read_solid_sections(problem: &mut Problem, block: &Block<'_>, cont
     }
 }
 
+/// What shells of the ELFORM of a card have in their plane, and whether they are membranes; none of a form that is refused.
+fn shell_form(f: &Fields<'_>, is_composite: bool, context: &Context<'_>) -> Option<(InPlane, bool)> {
+    let form = f.integer(1);
+    let warn = |what: &str| context.log.warn(f.at, format!("ELFORM {form}: {what}"));
+    let full = if is_composite { InPlane::One } else { InPlane::Four };
+    match form {
+        0 | 2 => Some((InPlane::One, false)),
+        5 => Some((InPlane::One, true)),
+        9 => Some((full, true)),
+        -16 | 16 if !is_composite => Some((full, false)),
+        6 | 7 | 18 | 20 | 21 | 26 if !is_composite => {
+            warn("shells are computed with four points in the plane, as ELFORM 16");
+            Some((full, false))
+        }
+        -16 | 1 | 3 | 4 | 6..=8 | 10 | 11 | 16..=18 | 20 | 21 | 25..=27 => {
+            warn("shells are computed with one point and hourglass control, as ELFORM 2 with warping");
+            Some((InPlane::One, false))
+        }
+        _ => {
+            f.fault(
+                1,
+                "ELFORM 2, 16, 5 or 9",
+                "take the shell of Belytschko, Lin and Tsay, of full integration, or a membrane",
+            );
+            None
+        }
+    }
+}
+
 pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     let mut cards = block.cards.iter();
     while let Some(card) = cards.next() {
         let f = context.fields(card, block.width, &TENS);
-        match f.integer(1) {
-            0 | 2 => {}
-            form @ (-16 | 1 | 3 | 4 | 6..=8 | 10 | 11 | 16..=18 | 20 | 21 | 25..=27) => context.log.warn(
-                card.at,
-                format!(
-                    "ELFORM {form}: shells are computed with one point and hourglass control, as ELFORM 2 with \
-                     warping"
-                ),
-            ),
-            _ => f.fault(1, "ELFORM 2", "take the shell of Belytschko, Lin and Tsay"),
+        let is_composite = f.integer(6) == 1;
+        let (in_plane, is_membrane) = shell_form(&f, is_composite, context).unwrap_or_default();
+        if is_membrane && is_composite {
+            f.fault(1, "shells that bend: a membrane has no plies", "take ELFORM 2, or ICOMP 0");
         }
         let (points, rule) = (f.integer(3), f.real(5, 0.0));
         if rule < 0.0 {
@@ -180,7 +209,6 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
         if points != asked && f.integer(6) != 1 {
             context.log.warn(card.at, format!("NIP {asked}: {points} points through the thickness"));
         }
-        let is_composite = f.integer(6) == 1;
         if !matches!(f.integer(6), 0 | 1) {
             f.fault(6, "ICOMP 0 or 1", "give 1 of a composite with the angles of its layers");
         }
@@ -215,7 +243,8 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
             plies = angles.drain(..).map(|angle| Ply { angle, share: 1.0 }).collect();
         }
         let (points, lobatto) = if plies.is_empty() { (points as u32, lobatto) } else { (1, false) };
-        let section = ShellSection { thickness, points, lobatto, angles, plies };
+        let (points, lobatto) = if is_membrane { (1, false) } else { (points, lobatto) };
+        let section = ShellSection { thickness, points, lobatto, in_plane, is_membrane, angles, plies };
         problem.sections.insert(f.id(0), (card.at, Section::Shell(section)));
     }
 }

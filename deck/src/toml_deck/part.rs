@@ -3,15 +3,14 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
-    element::shell4::Rule,
     failure::scatter::Scatter,
-    mesh::{Axis, Form, Guide, Laminate, MAX_LAYERS, Plies, Ply, Section, SolidAxes},
+    mesh::{Form, Guide, SolidAxes},
 };
 
 use super::{
     beam,
     entry::{face_names, text},
-    hourglass, shape,
+    hourglass, shape, shell,
 };
 use crate::{
     blocks::Block,
@@ -65,7 +64,7 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
         let (shell, truss, beam) = (table.get("shell"), table.get("truss"), table.get("beam"));
         let kind = match (shell, truss, beam) {
             (None, None, None) => Some(Kind::Solids),
-            (Some(value), None, None) => read_section(value, &name).map(Kind::Shells),
+            (Some(value), None, None) => shell::read(value, &name).map(Kind::Shells),
             (None, Some(value), None) => read_truss(value, &name),
             (None, None, Some(value)) => beam::read(value, &name),
             (_, Some(value), _) | (_, _, Some(value)) => {
@@ -146,88 +145,6 @@ fn read_erosion(value: Value<'_>, part: &str) -> Option<Erosion> {
     let failure = table.get("failure").and_then(|v| v.boolean().map(|on| v.placed(on)));
     table.finish();
     Some(Erosion { origin: value.origin(), limits, failure })
-}
-
-/// `shell = { thickness, points, rule, thinning }`, and of composites `angles` or `plies`, and `axes` or `across`.
-fn read_section(value: Value<'_>, name: &str) -> Option<Section> {
-    let table = value.table(format!("shell of \"{name}\""))?;
-    let plies = match table.get("plies") {
-        None => Some(None),
-        Some(value) => read_plies(value).map(Some),
-    };
-    let stacked = table.has("plies");
-    let thickness = match &plies {
-        Some(Some(plies)) => Some(plies.iter().map(|ply| ply.share).sum()),
-        _ if stacked => None,
-        _ => table.number("thickness", Range::Positive),
-    };
-    if let Some(value) = table.get("thickness").filter(|_| stacked) {
-        value.fault("no thickness beside plies, which have their own", "remove it");
-    }
-    let angles = match table.get("angles") {
-        Some(value) if stacked => {
-            value.fault("angles or plies", "remove one of them");
-            None
-        }
-        Some(value) => read_angles(value).map(Some),
-        None => Some(None),
-    };
-    let axes = table.get("axes").map(|value| value.one_of(&["material", "element"]));
-    let across = table.get("across").map(|value| (value, value.vector()));
-    if let (Some(_), Some((value, _))) = (axes, across) {
-        value.fault("axes or across", "remove one of them");
-    }
-    let axis = match (axes, across) {
-        (_, Some((_, across))) => across.map(|across| Some(Axis::Across(across))),
-        (Some(word), None) => word.map(|word| Some([Axis::Material, Axis::Side][word])),
-        (None, None) => Some(None),
-    };
-    let rule = table.get("rule").map_or(Some(0), |v| v.one_of(&["gauss", "lobatto"]));
-    let (least, default) = match (rule, stacked) {
-        (Some(1), _) => (3, 5),
-        (_, true) => (1, 2),
-        _ => (1, 3),
-    };
-    let points = table.integer_or("points", default, least, 5) as u32;
-    let thins = table.get("thinning").map_or(Some(true), |v| v.boolean());
-    table.finish();
-    let rule = if rule? == 1 { Rule::Lobatto(points) } else { Rule::Gauss(points) };
-    let (plies, angles, axis) = (plies?, angles?, axis?);
-    let is_composite = plies.is_some() || angles.is_some() || axis.is_some();
-    let laminate = is_composite.then(|| Laminate {
-        axis: axis.unwrap_or(Axis::Material),
-        plies: plies.map_or_else(|| Plies::AtPoints(angles.unwrap_or_default()), Plies::Stacked),
-    });
-    Some(Section { thickness: thickness?, rule, thins: thins?, breaks: None, laminate })
-}
-
-/// What an angle is (degrees).
-const ANGLE: Range = Range::Within(-360.0, 360.0, "an angle above -360 and at most 360 degrees");
-
-fn read_angles(value: Value<'_>) -> Option<Vec<f64>> {
-    let angles: Vec<f64> = value.items()?.iter().map(|v| v.number(ANGLE)).collect::<Option<_>>()?;
-    if angles.is_empty() {
-        value.fault("an angle for each point through the thickness", "give the angles, or remove it");
-        return None;
-    }
-    Some(angles)
-}
-
-/// `plies = [{ angle, thickness }, ...]`, from the lower side up.
-fn read_plies(value: Value<'_>) -> Option<Vec<Ply>> {
-    let items = value.items()?;
-    if items.is_empty() || items.len() > MAX_LAYERS {
-        value.fault(&format!("1 to {MAX_LAYERS} plies"), "give the plies from the lower side up");
-        return None;
-    }
-    let mut plies = Vec::with_capacity(items.len());
-    for (n, item) in (1..).zip(items) {
-        let table = item.table(format!("ply {n}"))?;
-        let (angle, thickness) = (table.number("angle", ANGLE), table.number("thickness", Range::Positive));
-        table.finish();
-        plies.push(angle.zip(thickness).map(|(angle, share)| Ply { angle, share }));
-    }
-    plies.into_iter().collect()
 }
 
 /// The key that says the kind of elements.

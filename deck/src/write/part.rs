@@ -4,7 +4,7 @@ use mechanics::{
     element::{
         beam2::{self, BeamSection},
         hourglass::Hourglass,
-        shell4::Rule,
+        shell4::{InPlane, Rule},
     },
     material::Material,
     mesh::{Axis, Guide, Plies, Ply, Section, Topology},
@@ -110,7 +110,8 @@ fn write_part(text: &mut Text, part: &Part) {
     if let Kind::Trusses { area } = part.kind {
         text.key("truss", table(&[("area", format!("{area:?}"))]));
     }
-    if let Kind::Shells(Section { thickness, rule, thins, laminate, .. }) = &part.kind {
+    if let Kind::Shells(Section { thickness, rule, thins, laminate, in_plane, is_membrane, .. }) = &part.kind
+    {
         let (rule, points) = match rule {
             Rule::Gauss(points) => ("gauss", points),
             Rule::Lobatto(points) => ("lobatto", points),
@@ -139,6 +140,8 @@ fn write_part(text: &mut Text, part: &Part) {
             Some(Axis::Across(across)) => keys.push(("across", vector(across))),
             Some(Axis::Material) | None => {}
         }
+        keys.extend((*in_plane != InPlane::One).then(|| ("in_plane", in_plane.points().to_string())));
+        keys.extend(is_membrane.then(|| ("membrane", "true".to_owned())));
         keys.extend((!thins).then(|| ("thinning", "false".to_owned())));
         text.key("shell", table(&keys));
     }

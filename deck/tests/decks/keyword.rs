@@ -23,7 +23,7 @@ use deck::{
     mesh_file,
 };
 use mechanics::{
-    element::shell4::Rule,
+    element::shell4::{InPlane, Rule},
     erosion::Criteria,
     load::Drive,
     material::Strength,
@@ -114,10 +114,7 @@ fn ball_on_shell_has_clamped_shells_of_five_points_that_solids_meet() {
     assert!(warnings.is_empty(), "{warnings:?}");
     let [sheet, ball] = &model.mesh.parts[..] else { panic!("two parts") };
     assert_eq!((sheet.name.as_str(), sheet.n_elements(), ball.n_elements()), ("sheet", 144, 64));
-    assert_eq!(
-        sheet.section(),
-        Some(&Section { thickness: 1.0, rule: Rule::Gauss(5), thins: true, breaks: None, laminate: None })
-    );
+    assert_eq!(sheet.section(), Some(&Section::of(1.0, Rule::Gauss(5))));
     // Both kinds are numbered from 1.
     assert_eq!((sheet.element_ids[0], ball.element_ids[0]), (1, 1));
     let held = |n: &&u32| model.setup.constraints[usize::from(model.constraint[**n as usize])].clamped == 7;
@@ -144,14 +141,13 @@ fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
     let part = &reading.model.mesh.parts[0];
     assert_eq!(
         part.section(),
-        Some(&Section { thickness: 2.0, rule: Rule::Lobatto(5), thins: false, breaks: None, laminate: None })
+        Some(&Section { thins: false, in_plane: InPlane::Four, ..Section::of(2.0, Rule::Lobatto(5)) })
     );
     assert_eq!(part.corners(1)[..4], [3, 2, 4, 4]);
     assert_eq!((reading.model.spin[2], reading.model.velocity[2]), ([0.0, 0.0, 3.0], [-30.0, 30.0, 0.0]));
     let of = |n: usize| reading.model.setup.constraints[usize::from(reading.model.constraint[n])];
     assert_eq!((of(0).velocity.map(|v| v.is_some()), of(0).clamped), ([true, false, false], 7));
     let words: Vec<&str> = reading.warnings.iter().map(|w| w.words.as_str()).collect();
-    assert!(words.iter().any(|w| w.starts_with("ELFORM 16")), "{words:?}");
     assert!(words.contains(&"NIP 7: 5 points through the thickness"), "{words:?}");
     assert!(words.iter().any(|w| w.starts_with("1 triangles")), "{words:?}");
     // Its own thickness goes before that of the section.
@@ -162,8 +158,40 @@ fn shells_of_a_keyword_deck_have_their_section_their_spin_and_triangles() {
     let model = read(&own).unwrap_or_else(|f| panic!("{}", lines(&f)));
     assert_eq!(
         model.mesh.parts[0].section(),
-        Some(&Section { thickness: 2.0, rule: Rule::Gauss(2), thins: false, breaks: None, laminate: None })
+        Some(&Section { thins: false, ..Section::of(2.0, Rule::Gauss(2)) })
     );
+}
+
+#[test]
+fn elform_says_the_points_in_the_plane_and_what_is_a_membrane() {
+    for (form, in_plane, is_membrane, warning) in [
+        (2, InPlane::One, false, ""),
+        (-16, InPlane::Four, false, ""),
+        (
+            6,
+            InPlane::Four,
+            false,
+            "ELFORM 6: shells are computed with four points in the plane, as ELFORM 16",
+        ),
+        (10, InPlane::One, false, "ELFORM 10: shells are computed with one point and hourglass control"),
+        (5, InPlane::One, true, ""),
+        (9, InPlane::Four, true, ""),
+    ] {
+        let text = square(&format!("*SECTION_SHELL\n1,{form},,3\n2,2,2,2\n"), "");
+        let Reading { model, warnings, .. } =
+            deck::read_whole(&text, "a.k").unwrap_or_else(|f| panic!("{}", lines(&f)));
+        let points = if is_membrane { 1 } else { 3 };
+        let section =
+            Section { thins: false, in_plane, is_membrane, ..Section::of(2.0, Rule::Gauss(points)) };
+        assert_eq!(model.mesh.parts[0].section(), Some(&section), "ELFORM {form}");
+        let found = warnings.iter().find(|warning| warning.words.starts_with("ELFORM"));
+        assert!(found.map_or("", |found| found.words.as_str()).starts_with(warning), "{found:?}");
+        assert_eq!(found.is_some(), !warning.is_empty(), "{found:?}");
+        let written =
+            deck::convert(&text, "a.k", "out.mesh").unwrap_or_else(|f| panic!("{}", lines(&f))).deck;
+        assert_eq!(written.contains("in_plane = 4"), in_plane == InPlane::Four, "{written}");
+        assert_eq!(written.contains("membrane = true"), is_membrane, "{written}");
+    }
 }
 
 #[test]
@@ -172,7 +200,7 @@ fn shells_that_cannot_be_computed_are_refused_at_their_line() {
     let sound = "*SECTION_SHELL\n1,2\n2,2,2,2\n";
     assert!(read(&square(sound, "")).is_ok());
     for (section, more, expected) in [
-        ("*SECTION_SHELL\n1,5\n2\n", "", "a.k:8:"),
+        ("*SECTION_SHELL\n1,12\n2\n", "", "a.k:8:"),
         ("*SECTION_SHELL\n1,2\n", "", "shell 1 without a thickness"),
         ("*SECTION_SHELL\n1,2,,,,,1\n2\n", "", "an angle for each of the NIP points"),
         ("*SECTION_SHELL\n1,2\n2,2,2,2,1\n", "", "nodes in the middle of the thickness"),

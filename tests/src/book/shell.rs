@@ -278,13 +278,20 @@ fn frequency(solved: &Solved, axis: usize) -> f64 {
     0.5 * (zeros.len() - 1) as f64 / (zeros[zeros.len() - 1] - zeros[0])
 }
 
-/// Balmer and Witmer's panel as in the room of structures, of shells with five points. Half of it.
+/// Balmer and Witmer's panel as in the room of structures, of shells with five points through the thickness. Half of it.
 pub(super) fn the_impulsive_panel_of_shells_is_dented_about_as_deep(figures: &mut Figures) {
+    impulsive_panel(figures, "shells", 1);
+    impulsive_panel(figures, "shells of four points", 4);
+}
+
+/// The panel with so many points in the plane.
+fn impulsive_panel(figures: &mut Figures, kind: &str, in_plane: u32) {
     let (radius, thickness, length) = (2.9375 * INCH, 0.125 * INCH, 12.56 * INCH);
     let material = plastic(2.5e-4 * DENSITY, 10.5e6 * PSI, 0.33, 44_000.0 * PSI);
     let deck = format!(
         "title = \"impulsive panel\"\nunits = \"SI\"\n[control]\nend_time = 600e-6\n\
-         [[part]]\nname = \"panel\"\nmaterial = {material}\nshell = {{ thickness = {thickness:e}, points = 5 }}\n\
+         [[part]]\nname = \"panel\"\nmaterial = {material}\n\
+         shell = {{ thickness = {thickness:e}, points = 5, in_plane = {in_plane} }}\n\
          plate = {{ origin = [0, 0, 0], side_i = [1, 0, 0], side_j = [0, 1, 0], cells = [16, 32] }}\n\
          [[boundary]]\ntype = \"fixed\"\nparts = [\"panel\"]\nface = \"i-min\"\nrotations = \"xyz\"\n\
          [[boundary]]\ntype = \"fixed\"\nparts = [\"panel\"]\nface = \"i-max\"\naxes = \"x\"\nrotations = \"yz\"\n\
@@ -313,9 +320,9 @@ pub(super) fn the_impulsive_panel_of_shells_is_dented_about_as_deep(figures: &mu
     for (gauge, name) in [(0, "half way"), (1, "at three quarters")] {
         let start = solved.model.mesh.positions[solved.model.output.gauges[gauge].node as usize][1];
         let greatest = solved.rows.iter().map(|row| start - row.gauges[gauge].x[1]).fold(0.0, f64::max);
-        figures.add(&format!("impulsive panel of shells @ {name}, deflection (in)"), greatest / INCH);
+        figures.add(&format!("impulsive panel of {kind} @ {name}, deflection (in)"), greatest / INCH);
     }
-    figures.add("impulsive panel of shells: energy error", solved.outcome.run_totals.last.error);
+    figures.add(&format!("impulsive panel of {kind}: energy error"), solved.outcome.run_totals.last.error);
 }
 
 /// A tube of shells that a wall shortens at a speed.

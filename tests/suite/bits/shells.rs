@@ -1,6 +1,10 @@
 //! Same bits where shells and solids meet.
 
 use deck::Model;
+use mechanics::{
+    element::shell4::{InPlane, Rule},
+    mesh::{Section, Topology},
+};
 use tests::{
     bits::Fingerprint,
     solve::{Workers, model, solve},
@@ -91,6 +95,33 @@ fn shells_and_solids_in_contact_have_the_same_bits_on_both_routes() {
         }
         assert_ne!(fingerprint(&other, Workers::default()).digest, one.digest, "parts {pair:?} never meet");
     }
+}
+
+/// The same, but the tube has four points in its plane, and the lid is a membrane of four points.
+fn four_points() -> Model {
+    let mut model = shells_and_solids();
+    let parts = &mut model.mesh.parts;
+    for (part, is_membrane) in [(1, false), (3, true)] {
+        let Topology::Shells { section, .. } = &mut parts[part].topology else { panic!("a part of shells") };
+        *section = Section {
+            in_plane: InPlane::Four,
+            is_membrane,
+            ..Section::of(section.thickness, Rule::Gauss(if is_membrane { 1 } else { 3 }))
+        };
+    }
+    model
+}
+
+#[test]
+fn shells_of_four_points_and_membranes_have_the_same_bits() {
+    let model = four_points();
+    same_bits(&model);
+    let alone = solve(model.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
+    let row = alone.rows.last().expect("rows");
+    assert!(row.error.abs() < 0.02, "energy error {}", row.error);
+    let one = Fingerprint::of(&alone);
+    same_bits_on_route_direct(&model, &one);
+    assert_ne!(fingerprint(&shells_and_solids(), Workers::default()).digest, one.digest);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use mechanics::{
-    element::shell4::Rule,
+    element::shell4::{InPlane, Rule},
     mesh::{self, Axis, Guide, Laminate, Plies, Ply, SolidAxes},
 };
 
@@ -74,12 +74,21 @@ pub(super) fn write(t: &mut Translation<'_>) {
                     if shell.lobatto { Rule::Lobatto(shell.points) } else { Rule::Gauss(shell.points) };
                 let thickness = t.number(at, "a thickness of", *thickness);
                 let fibres = problem.materials.get(&part.material.value).and_then(|card| card.fibres);
+                let laminate = laminate(shell, fibres);
+                let in_plane = match (&laminate, shell.in_plane) {
+                    (Some(_), InPlane::Four) => {
+                        let what = "its layers are plies, so it is computed with one point in the plane";
+                        t.log.warn(at, format!("part {id}: {what}"));
+                        InPlane::One
+                    }
+                    (_, asked) => asked,
+                };
                 Kind::Shells(mesh::Section {
-                    thickness,
-                    rule,
                     thins: problem.control.shells_thin,
-                    breaks: None,
-                    laminate: laminate(shell, fibres),
+                    laminate,
+                    in_plane,
+                    is_membrane: shell.is_membrane,
+                    ..mesh::Section::of(thickness, rule)
                 })
             }
             (None, Some((_, Section::Truss(area)))) => {
