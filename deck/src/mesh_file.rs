@@ -57,6 +57,8 @@ pub struct Body {
     pub tetrahedra: Vec<(u32, [u32; 10])>,
     /// Number and corners of each shell.
     pub shells: Vec<(u32, [u32; 4])>,
+    /// Of each shell its own thickness (length), 0 where that of the part serves; empty where no shell has its own.
+    pub thicknesses: Vec<f64>,
     /// Number and ends of each truss. A body has elements of one kind.
     pub trusses: Vec<(u32, [u32; 2])>,
     /// Of each truss a direction that a beam there has across it, or none of any.

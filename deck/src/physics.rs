@@ -260,7 +260,9 @@ impl Sums {
             let x = corners.map(|n| model.mesh.positions[n as usize]);
             let longest = longest_edge(&x);
             let thinnest = match &part.topology {
-                Topology::Shells { section, .. } => v / (section.thickness * longest),
+                Topology::Shells { section, .. } => {
+                    v / (part.thickness_of(e).unwrap_or(section.thickness) * longest)
+                }
                 Topology::Trusses { .. } | Topology::Beams { .. } => longest,
                 // A third of the least height: a node stands half-way up.
                 Topology::Tetrahedra { .. } => v / largest_side(&x),
@@ -271,7 +273,7 @@ impl Sums {
                 Topology::Structured { .. } | Topology::EightPoint { .. } => thinnest_way(&x),
             };
             sums.volume += v;
-            sums.area += part.thickness().map_or(0.0, |thickness| v / thickness);
+            sums.area += part.thickness_of(e).map_or(0.0, |thickness| v / thickness);
             sums.least_cell = sums.least_cell.min(thinnest);
             let height =
                 if let Topology::Tetrahedra { .. } = part.topology { 3.0 * thinnest } else { thinnest };

@@ -460,6 +460,11 @@ impl<'a> Value<'a> {
         self.answered("a text", matches!(self.value, DeValue::String(_)))
     }
 
+    /// Whether this is a list of so many values.
+    pub(crate) fn is_list_of(&self, n: usize) -> bool {
+        self.answered("of that length", matches!(self.value, DeValue::Array(array) if array.len() == n))
+    }
+
     pub fn is_list(&self) -> bool {
         self.answered("a list", matches!(self.value, DeValue::Array(_)))
     }

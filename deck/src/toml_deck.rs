@@ -11,6 +11,7 @@ mod hourglass;
 pub(crate) mod joint;
 mod output;
 mod part;
+mod row;
 mod shape;
 mod shell;
 

@@ -124,6 +124,7 @@ macro_rules! each_case_of_the_book {
             shell: the_cylinder_is_pinched_as_published quick;
             shell: the_hemisphere_opens_as_published long;
             shell: a_cantilever_of_shells_bends_as_a_beam quick;
+            shell: a_tapered_cantilever_of_shells_bends_as_a_beam quick;
             beam: a_cantilever_of_beams_bends_as_timoshenko_says quick;
             beam: a_cantilever_of_beams_rings_as_timoshenko_says quick;
             beam: a_pressed_column_loses_its_stiffness_at_eulers_load quick;

@@ -80,8 +80,12 @@ impl Block {
                 tetrahedra.retain(|_| stays());
                 tetrahedra.iter_mut().for_each(|nodes| *nodes = nodes.each_ref().map(renumbered));
             }
-            Topology::Shells { quads, .. } => {
-                quads.retain(|_| stays());
+            Topology::Shells { quads, thicknesses, .. } => {
+                let keep: Vec<bool> = quads.iter().map(|_| stays()).collect();
+                let mut kept = keep.iter();
+                quads.retain(|_| *kept.next().expect("one for each"));
+                let mut kept = keep.iter();
+                thicknesses.retain(|_| *kept.next().expect("one for each"));
                 quads.iter_mut().for_each(|corners| *corners = corners.each_ref().map(renumbered));
             }
             Topology::Beams { bars, across, .. } => {

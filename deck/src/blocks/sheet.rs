@@ -26,7 +26,11 @@ pub(super) fn plate(origin: [f64; 3], sides: [[f64; 3]; 2], [ni, nj]: [u32; 2], 
         ("j-min", side(&|_, j| j == 0)),
         ("j-max", side(&|_, j| j == nj)),
     ];
-    Block { positions, topology: Topology::Shells { quads: quads(ni, nj, &node), section }, faces }
+    Block {
+        positions,
+        topology: Topology::Shells { quads: quads(ni, nj, &node), section, thicknesses: Vec::new() },
+        faces,
+    }
 }
 
 /// The wall of a tube about z from z = 0, closed on itself.
@@ -52,7 +56,11 @@ pub(super) fn prism(
     }
     let node = |i: u32, j: u32| (i % ni) + ni * j;
     let faces = vec![("j-min", (0..ni).collect()), ("j-max", (ni * nj..ni * (nj + 1)).collect())];
-    Block { positions, topology: Topology::Shells { quads: quads(ni, nj, &node), section }, faces }
+    Block {
+        positions,
+        topology: Topology::Shells { quads: quads(ni, nj, &node), section, thicknesses: Vec::new() },
+        faces,
+    }
 }
 
 fn quads(ni: u32, nj: u32, node: &dyn Fn(u32, u32) -> u32) -> Vec<[u32; 4]> {

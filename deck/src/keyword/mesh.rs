@@ -5,6 +5,7 @@ use super::{
     fields::{Context, EIGHTS, TENS},
     problem::{Beam, Node, Problem, Shell, Solid},
 };
+use crate::table::Range;
 
 /// `*NODE`.
 pub(super) fn read_nodes(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
@@ -98,18 +99,16 @@ pub(super) fn read_shells(problem: &mut Problem, block: &Block<'_>, context: &Co
             f.fault(6, "at most four nodes", "mesh with four-node shells");
             continue;
         }
-        let mut thickness = None;
+        let mut corners = [0.0; 4];
         if thick {
             let Some(second) = cards.next() else {
                 f.fault(0, "a second card with the thicknesses", "complete the element");
                 return;
             };
             let g = context.fields(second, block.width, &[16; 5]);
-            let corners = if nodes[3] == nodes[2] { 3 } else { 4 };
-            let mean = (0..corners).map(|i| g.real(i, 0.0)).sum::<f64>() / corners as f64;
-            thickness = Some(mean).filter(|mean| *mean > 0.0);
+            corners = [0, 1, 2, 3].map(|i| g.within(i, 0.0, Range::NotNegative));
         }
-        problem.shells.push(Shell { id: f.id(0), part: f.id(1), nodes, thickness, at: card.at });
+        problem.shells.push(Shell { id: f.id(0), part: f.id(1), nodes, corners, at: card.at });
     }
 }
 

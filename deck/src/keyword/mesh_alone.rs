@@ -35,6 +35,14 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> (MeshFile, Vec<Vec<Place>>) {
     let mut edges: BTreeMap<u32, [u32; 6]> = BTreeMap::new();
     edges.extend(problem.solids.iter().filter_map(|solid| Some((solid.id, solid.edges?))));
     let shells = problem.shells.iter().map(|shell| (1, shell.id, shell.part, shell.at, &shell.nodes[..]));
+    let mut thicknesses: BTreeMap<u32, f64> = BTreeMap::new();
+    for shell in &problem.shells {
+        if !shell.is_even() {
+            let read = format!("shell {} with a thickness at some of its corners", shell.id);
+            log.fault(shell.at, read, "one at all corners, or none", "give all, as the section is not read");
+        }
+        thicknesses.insert(shell.id, shell.thickness(0.0));
+    }
     let beams = problem.beams.iter().map(|beam| (2, beam.id, beam.part, beam.at, &beam.nodes[..]));
     let mut seen: [BTreeMap<u32, Place>; 3] = Default::default();
     for (kind, id, part, at, nodes) in solids.chain(shells).chain(beams) {
@@ -56,7 +64,10 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> (MeshFile, Vec<Vec<Place>>) {
                 body.tetrahedra.push((id, [a, b, c, d, e, f, g, h, i, j]));
             }
             (Ok(nodes), ..) => body.solids.push((id, corners_of(nodes))),
-            (_, Ok(nodes), _) => body.shells.push((id, nodes)),
+            (_, Ok(nodes), _) => {
+                body.shells.push((id, nodes));
+                body.thicknesses.push(thicknesses.get(&id).copied().unwrap_or_default());
+            }
             (.., Ok(nodes)) => body.trusses.push((id, nodes)),
             _ => {}
         }
@@ -78,6 +89,9 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> (MeshFile, Vec<Vec<Place>>) {
         let named = !title.is_empty() && !several.contains(title);
         body.name = if named { title.to_string() } else { format!("part {part}") };
         body.number = Some(part);
+        if body.thicknesses.iter().all(|thickness| *thickness == 0.0) {
+            body.thicknesses.clear();
+        }
         mesh.bodies.push(body);
         places.push(of_elements);
     }

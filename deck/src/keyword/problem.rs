@@ -44,9 +44,30 @@ pub(super) struct Shell {
     pub(super) id: u32,
     pub(super) part: u32,
     pub(super) nodes: [u32; 4],
-    /// Of its own, the mean of its corners.
-    pub(super) thickness: Option<f64>,
+    /// Thicknesses of its own at the corners, the last twice in a triangle; 0 is that of the section.
+    pub(super) corners: [f64; 4],
     pub(super) at: Place,
+}
+
+impl Shell {
+    /// The mean of its corners, where `of_section` is the thickness of corners without one; 0 where none of them has any.
+    pub(super) fn thickness(&self, of_section: f64) -> f64 {
+        let own = self.own();
+        if own.iter().all(|t| *t == 0.0) {
+            return of_section;
+        }
+        own.iter().map(|t| if *t > 0.0 { *t } else { of_section }).sum::<f64>() / own.len() as f64
+    }
+
+    /// The thicknesses of its corners.
+    fn own(&self) -> &[f64] {
+        if self.nodes[3] == self.nodes[2] { &self.corners[..3] } else { &self.corners }
+    }
+
+    /// Whether all of its corners have a thickness, or none.
+    pub(super) fn is_even(&self) -> bool {
+        self.own().iter().all(|t| (*t > 0.0) == (self.corners[0] > 0.0))
+    }
 }
 
 /// A truss or beam, of `*ELEMENT_BEAM`.

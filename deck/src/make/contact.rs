@@ -222,7 +222,7 @@ pub(super) fn gap_to_come(
 fn thinnest(assembly: &Assembly, interacts: &[bool]) -> Option<f64> {
     let parts = &assembly.mesh.parts;
     let meets = |p: usize| interacts[p * parts.len()..(p + 1) * parts.len()].contains(&true);
-    let of_shells = (0..parts.len()).filter(|&p| meets(p)).filter_map(|p| parts[p].thickness());
+    let of_shells = (0..parts.len()).filter(|&p| meets(p)).filter_map(|p| parts[p].least_thickness());
     of_shells.min_by(f64::total_cmp)
 }
 

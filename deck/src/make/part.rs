@@ -7,12 +7,13 @@ use mechanics::{
     erosion::{Criteria, GEOMETRIC_STRAIN},
     failure::scatter::Scatter,
     material::{Failure, Material, Strength},
-    mesh::{self, Form, Laminate, SolidAxes, Topology},
+    mesh::{self, Form, Laminate, Plies, SolidAxes, Topology},
 };
 
 use super::material::Materials;
 use crate::{
     blocks::Block,
+    fault::short,
     geometry::{norm, scaled},
     limits::{MAX_ELEMENTS, MAX_NODES},
     log::Log,
@@ -82,6 +83,7 @@ pub(super) fn make(
         let eight_points = has_eight_points(part, of_material, log);
         let hourglass = hourglass_of(part, of_material, hourglass, log);
         let (mut block, numbers) = mesh_of(part, meshes, &mut budget, log);
+        check_lay_up(part, block.as_ref(), numbers.as_ref(), log);
         if let Some(block) = &mut block {
             transform(part, block);
         }
@@ -375,6 +377,27 @@ fn mesh_of(
     }
 }
 
+/// Plies have thicknesses of their own, so all elements of such a part have their sum.
+fn check_lay_up(part: &Part, block: Option<&Block>, numbers: Option<&Numbers>, log: &Log<'_>) {
+    let Some((Block { topology: Topology::Shells { section, thicknesses, .. }, .. }, numbers)) =
+        block.zip(numbers)
+    else {
+        return;
+    };
+    let has_plies = section.laminate.as_ref().is_some_and(|l| matches!(l.plies, Plies::Stacked(_)));
+    let other = thicknesses.iter().position(|t| *t != section.thickness);
+    if let Some(e) = other.filter(|_| has_plies) {
+        let read = format!(
+            "element {} of part \"{}\" with a thickness of {}",
+            numbers.elements[e],
+            part.name,
+            short(thicknesses[e])
+        );
+        let expected = format!("{}, that of its plies together", short(section.thickness));
+        log.fault(numbers.element_places.of(e), read, expected, "make a part of the elements of each lay-up");
+    }
+}
+
 /// A body of a mesh, by default the one called like the part.
 fn body_of(
     part: &Part,
@@ -461,7 +484,7 @@ fn body_of(
     }
     let corners: Vec<u32> = found.corners().map(|id| local[&id]).collect();
     let topology = if found.tetrahedra.is_empty() {
-        let mut topology = part.kind.topology(corners.chunks(part.kind.n_corners()));
+        let mut topology = part.kind.topology(corners.chunks(part.kind.n_corners()), &found.thicknesses);
         if let (Topology::Beams { across, .. }, false) = (&mut topology, found.across.is_empty()) {
             across.clone_from(&found.across);
         }

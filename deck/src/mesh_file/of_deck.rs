@@ -119,13 +119,23 @@ fn raised(mesh: &mut MeshFile, origin: Origin, log: &Log<'_>) {
     log.fault_of(origin, expected, advice);
 }
 
-/// Scales the positions of the nodes.
+/// Scales the positions of the nodes and the thicknesses of shells.
 fn scaled(mesh: &mut MeshFile, scale: &Placed<f64>, log: &Log<'_>) {
     for (id, x) in &mut mesh.nodes {
         *x = x.map(|c| c * scale.value);
         if !x.iter().all(|c| holds(*c)) {
             let expected =
                 format!("a scale that leaves magnitudes from 1e-60 to 1e60; node {id} comes to {x:?}");
+            log.fault_of(scale.origin, expected, "choose another scale");
+            return;
+        }
+    }
+    for thickness in mesh.bodies.iter_mut().flat_map(|body| &mut body.thicknesses) {
+        *thickness *= scale.value;
+        if !holds(*thickness) {
+            let expected = format!(
+                "a scale that leaves magnitudes from 1e-60 to 1e60; a shell comes to a thickness of {thickness:?}"
+            );
             log.fault_of(scale.origin, expected, "choose another scale");
             return;
         }

@@ -32,7 +32,7 @@ use super::{Body, MeshFile};
 use crate::{
     fault::{Fault, Faults},
     limits::{MAX_ELEMENTS, MAX_ENTRIES, MAX_ID, MAX_NODES},
-    table::{MAX_NAME, MAX_NUMBER},
+    table::{MAX_NAME, MAX_NUMBER, holds},
 };
 
 /// First line of every mesh file.
@@ -63,13 +63,13 @@ impl MeshFile {
             let _ = writeln!(text, "{} {} \"{}\"", body.kind(), body.elements().count(), body.name);
             for (n, (id, nodes)) in body.elements().enumerate() {
                 let numbers: Vec<u32> = std::iter::once(id).chain(nodes.iter().copied()).collect();
-                match body.across.get(n) {
-                    Some([x, y, z]) => {
-                        let words: Vec<String> = numbers.iter().map(u32::to_string).collect();
-                        let _ = writeln!(text, "{} {x:?} {y:?} {z:?}", words.join(" "));
-                    }
-                    None => row(&mut text, &numbers),
-                }
+                let behind = match (body.across.get(n), body.thicknesses.get(n)) {
+                    (Some([x, y, z]), _) => format!(" {x:?} {y:?} {z:?}"),
+                    (None, Some(thickness)) => format!(" {thickness:?}"),
+                    (None, None) => String::new(),
+                };
+                let words: Vec<String> = numbers.iter().map(u32::to_string).collect();
+                let _ = writeln!(text, "{}{behind}", words.join(" "));
             }
         }
         for (name, nodes) in &self.sets {
@@ -274,7 +274,21 @@ fn row(
             mesh.bodies[*body].solids.push((id, corners));
         }
         Section::Shells(body) => {
-            let [id, corners @ ..] = numbers::<5>(line)?;
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let is_thick = words.len() == 6;
+            let of_nodes = if is_thick { words[..5].join(" ") } else { line.to_string() };
+            let [id, corners @ ..] = numbers::<5>(&of_nodes)?;
+            let found = &mut mesh.bodies[*body];
+            if is_thick == found.thicknesses.is_empty() && !found.shells.is_empty() {
+                return Err(("a thickness as the elements before have or not".to_string(), MIXED));
+            }
+            if is_thick {
+                let thickness = words[5].parse().ok().filter(|t: &f64| holds(*t) && *t >= 0.0);
+                found.thicknesses.push(thickness.ok_or_else(|| {
+                    let expected = "number, four nodes, a thickness above 0, or 0 for that of the part";
+                    (expected.to_string(), "correct the line")
+                })?);
+            }
             if !elements[1].insert(id) {
                 return Err((format!("an element number other than {id}"), "renumber one"));
             }
@@ -371,6 +385,12 @@ mod tests {
                     shells: vec![(8, [15, 16, 18, 17]), (9, [11, 12, 14, 14])],
                     ..Body::default()
                 },
+                Body {
+                    name: "its floor".to_string(),
+                    shells: vec![(18, [11, 12, 14, 13]), (19, [15, 16, 18, 18])],
+                    thicknesses: vec![0.1, 0.0],
+                    ..Body::default()
+                },
             ],
             sets: BTreeMap::from([("set 1".to_string(), (11..19).chain(11..19).collect())]),
             segments: BTreeMap::from([("top".to_string(), vec![[15, 16, 18, 17]])]),
@@ -403,6 +423,11 @@ mod tests {
             faulty("nodes 8", "nodes 9")
                 .contains("a.mesh:11:1: read solids 1 \"the cube\"; expected number x y z")
         );
+        assert!(
+            faulty("14 13 0.1", "14 13 -0.1")
+                .contains("expected number, four nodes, a thickness above 0, or 0")
+        );
+        assert!(faulty("18 18 0.0", "18 18").contains("a thickness as the elements before have or not"));
         assert!(faulty("spins 1", "spins 2").contains("read the end of the file; expected 1 more lines"));
         assert!(parse("", "a.mesh").expect_err("empty")[0].read.contains("empty"));
     }

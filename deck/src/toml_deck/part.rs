@@ -10,7 +10,7 @@ use mechanics::{
 use super::{
     beam,
     entry::{face_names, text},
-    hourglass, shape, shell,
+    hourglass, row, shape, shell,
 };
 use crate::{
     blocks::Block,
@@ -293,7 +293,7 @@ fn read_mesh(
     source.map(|source| PartMesh { at, title, source })
 }
 
-/// Nodes `[id, x, y, z]` and elements `[id, n1 ... n8]`, of shells `[id, n1 ... n4]`, of trusses and beams `[id, n1, n2]`.
+/// Nodes `[id, x, y, z]` and elements as [`row::read`] has them.
 fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
     let max = u64::from(MAX_ID);
     let nodes = table.require("nodes", "a list of [id, x, y, z]").and_then(|v| v.items());
@@ -320,18 +320,11 @@ fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
         node_places.push(Place::text(node.at));
         positions.push([x, y, z]);
     }
-    let mut all_corners: Vec<u32> = Vec::new();
+    let (mut all_corners, mut thicknesses): (Vec<u32>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut seen: BTreeMap<u32, Place> = BTreeMap::new();
     let mut used = vec![false; positions.len()];
     for element in &elements {
-        let numbers = match kind {
-            Kind::Solids => element.integers::<9>("[id, n1, ..., n8]", 1, max).map(|n| n.to_vec()),
-            Kind::Shells(_) => element.integers::<5>("[id, n1, n2, n3, n4]", 1, max).map(|n| n.to_vec()),
-            Kind::Trusses { .. } | Kind::Beams { .. } => {
-                element.integers::<3>("[id, n1, n2]", 1, max).map(|n| n.to_vec())
-            }
-        };
-        let Some(numbers) = numbers else { continue };
+        let Some((numbers, thickness)) = row::read(element, &kind) else { continue };
         let id = numbers[0] as u32;
         if let Some(first) = seen.insert(id, Place::text(element.at)) {
             let line = table.faults.line_seen_from(first, table.place());
@@ -376,6 +369,7 @@ fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
         }
         if complete {
             all_corners.extend(corners);
+            thicknesses.push(thickness.unwrap_or(0.0));
             element_ids.push(id);
             element_places.push(Place::text(element.at));
         }
@@ -401,7 +395,7 @@ fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
     }
     let clean = table.faults.count() == before;
     table.finish();
-    let topology = kind.topology(all_corners.chunks(kind.n_corners()));
+    let topology = kind.topology(all_corners.chunks(kind.n_corners()), &thicknesses);
     let numbers = Numbers {
         nodes: node_ids,
         elements: element_ids,

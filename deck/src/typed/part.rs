@@ -87,20 +87,38 @@ impl Kind {
         }
     }
 
-    /// Elements of this kind by the local indices of their nodes, [`Kind::n_corners`] each.
-    pub(crate) fn topology<'a>(&self, elements: impl Iterator<Item = &'a [u32]>) -> Topology {
+    /// Elements of this kind by the local indices of their nodes, [`Kind::n_corners`] each. `thicknesses` are by shell, 0 where that of
+    /// the section serves, or empty.
+    pub(crate) fn topology<'a>(
+        &self,
+        elements: impl Iterator<Item = &'a [u32]>,
+        thicknesses: &[f64],
+    ) -> Topology {
         fn fixed<'a, const N: usize>(elements: impl Iterator<Item = &'a [u32]>) -> Vec<[u32; N]> {
             elements.map(|nodes| std::array::from_fn(|i| nodes[i])).collect()
         }
         match self {
             Self::Solids => Topology::Explicit { hexahedra: fixed(elements) },
-            Self::Shells(section) => Topology::Shells { quads: fixed(elements), section: section.clone() },
+            Self::Shells(section) => Topology::Shells {
+                quads: fixed(elements),
+                section: section.clone(),
+                thicknesses: of_their_own(thicknesses, section.thickness),
+            },
             Self::Trusses { area } => Topology::Trusses { bars: fixed(elements), area: *area },
             Self::Beams { section, across } => {
                 let bars: Vec<[u32; 2]> = fixed(elements);
                 Topology::Beams { across: vec![*across; bars.len()], bars, section: *section }
             }
         }
+    }
+}
+
+/// The thicknesses of shells where 0 is `common`; empty where all have that.
+fn of_their_own(thicknesses: &[f64], common: f64) -> Vec<f64> {
+    let whole = |t: &f64| if *t > 0.0 { *t } else { common };
+    match thicknesses.iter().all(|t| whole(t) == common) {
+        true => Vec::new(),
+        false => thicknesses.iter().map(whole).collect(),
     }
 }
 

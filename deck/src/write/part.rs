@@ -245,8 +245,12 @@ fn explicit(own: &Explicit) -> String {
         Topology::Tetrahedra { tetrahedra } => {
             list(tetrahedra.iter().zip(numbers).map(|(nodes, id)| element(id, nodes)))
         }
-        Topology::Shells { quads, .. } => {
-            list(quads.iter().zip(numbers).map(|(corners, id)| element(id, corners)))
+        Topology::Shells { quads, thicknesses, .. } => {
+            list(quads.iter().zip(numbers).enumerate().map(|(e, (corners, id))| {
+                let corners = corners.iter().map(|node| ids[*node as usize].to_string());
+                let words = std::iter::once(id.to_string()).chain(corners);
+                list(words.chain(thicknesses.get(e).map(|thickness| format!("{thickness:?}"))))
+            }))
         }
         Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => {
             list(bars.iter().zip(numbers).map(|(ends, id)| element(id, ends)))

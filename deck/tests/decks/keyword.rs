@@ -195,6 +195,27 @@ fn elform_says_the_points_in_the_plane_and_what_is_a_membrane() {
 }
 
 #[test]
+fn shells_of_a_part_have_the_mean_thickness_of_their_corners() {
+    let more = "*ELEMENT_SHELL_THICKNESS\n3,1,1,2,3,4\n1,2,0,4\n4,1,1,2,4\n1,1,4\n5,1,4,3,5\n0,0,0\n";
+    let model =
+        read(&square("*SECTION_SHELL\n1,2\n3,3,3,3\n", more)).unwrap_or_else(|f| panic!("{}", lines(&f)));
+    let part = &model.mesh.parts[0];
+    let own: Vec<Option<f64>> = (0..5).map(|e| part.thickness_of(e)).collect();
+    assert_eq!(own, [3.0, 3.0, 2.5, 2.0, 3.0].map(Some));
+    assert_eq!(part.least_thickness(), Some(2.0));
+    // The same as a mesh of a TOML deck, whose part has a thickness for those without one.
+    let text = square("*SECTION_SHELL\n1,2\n3,3,3,3\n", "*ELEMENT_SHELL_THICKNESS\n3,1,1,2,3,4\n1,2,3,4\n");
+    let mesh = mesh_file::parse(&text, "a.k").unwrap_or_else(|f| panic!("{}", lines(&f)));
+    assert_eq!(mesh.bodies[0].thicknesses, [0.0, 0.0, 2.5]);
+    assert_eq!(
+        mesh_file::parse(&mesh.text(), "a.mesh").map(|own| own.bodies[0].thicknesses.clone()),
+        Ok(vec![0.0, 0.0, 2.5])
+    );
+    let uneven = mesh_file::parse(&text.replace("\n1,2,3,4\n", "\n1,2,0,4\n"), "a.k").expect_err("a fault");
+    assert!(lines(&uneven).contains("shell 3 with a thickness at some of its corners"), "{}", lines(&uneven));
+}
+
+#[test]
 fn shells_that_cannot_be_computed_are_refused_at_their_line() {
     let fault = |section: &str, more: &str| read(&square(section, more)).expect_err("a fault")[0].to_string();
     let sound = "*SECTION_SHELL\n1,2\n2,2,2,2\n";
@@ -208,7 +229,12 @@ fn shells_that_cannot_be_computed_are_refused_at_their_line() {
         (sound, "*ELEMENT_SHELL\n2,1,1,2,3,4\n", "a number other than 2"),
         (sound, "*ELEMENT_SHELL\n3,1,1,2,3,9\n", "shell 3 with node 9"),
         (sound, "*ELEMENT_SHELL\n3,1,1,2,1,4\n", "a triangle that repeats the third"),
-        (sound, "*ELEMENT_SHELL_THICKNESS\n3,1,1,2,3,4\n1,1,1,1\n", "shell 3 of thickness 1"),
+        (sound, "*ELEMENT_SHELL_THICKNESS\n3,1,1,2,3,4\n1,-1,1,1\n", "expected a number of 0 or more"),
+        (
+            "*SECTION_SHELL\n1,2\n",
+            "*ELEMENT_SHELL_THICKNESS\n3,1,1,2,3,4\n1,0,1,1\n",
+            "shell 1 without a thickness",
+        ),
         (sound, "*ELEMENT_SHELL\n3,1,1,2,3,4,5\n", "at most four nodes"),
     ] {
         let said = fault(section, more);

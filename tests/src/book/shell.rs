@@ -176,6 +176,39 @@ pub(super) fn a_cantilever_of_shells_bends_as_a_beam(figures: &mut Figures) {
     figures.add("cantilever of shells: deflection of its tip", gone(&solved, 82, 2));
 }
 
+/// The same, whose thickness falls by steps of its elements from 12 mm at the support to 4 mm at the tip.
+pub(super) fn a_tapered_cantilever_of_shells_bends_as_a_beam(figures: &mut Figures) {
+    const CELLS: usize = 40;
+    let thickness = |i: usize| 0.012 - 0.008 * (i as f64 + 0.5) / CELLS as f64;
+    let mut nodes = String::new();
+    for j in 0..3 {
+        for i in 0..=CELLS {
+            let (x, y) = (0.2 * i as f64 / CELLS as f64, 0.005 * f64::from(j));
+            nodes += &format!("[{}, {x:?}, {y:?}, 0], ", j as usize * (CELLS + 1) + i + 1);
+        }
+    }
+    let mut elements = String::new();
+    for e in 0..2 * CELLS {
+        let a = e / CELLS * (CELLS + 1) + e % CELLS + 1;
+        let [b, c, d] = [a + 1, a + CELLS + 2, a + CELLS + 1];
+        elements += &format!("[{}, {a}, {b}, {c}, {d}, {:?}], ", e + 1, thickness(e % CELLS));
+    }
+    let mut deck = format!(
+        "title = \"tapered\"\nunits = \"SI\"\n[control]\nend_cycle = 20000\nend_time = 1e9\n[output]\nhistory_cycles = 1000\n\
+         [relaxation]\nfactor = 0.998\n\
+         [[part]]\nname = \"sheet\"\nmaterial = {}\nshell = {{ thickness = 0.01, points = 2 }}\n\
+         mesh = {{ nodes = [{nodes}], elements = [{elements}] }}\n\
+         [[boundary]]\ntype = \"fixed\"\nnodes = [1, 42, 83]\nrotations = \"xyz\"\n",
+        elastic(8000.0, 2e11, 0.3)
+    );
+    for (j, share) in [(0, 0.25), (1, 0.5), (2, 0.25)] {
+        deck += &pushed(&[41 * (j + 1)], [0.0, 0.0, 20.0 * share]);
+    }
+    let solved = run(model(&deck));
+    figures.add("tapered cantilever of shells: deflection of its tip (m)", gone(&solved, 82, 2));
+    figures.add("tapered cantilever of shells: mass (kg)", solved.state.mass.iter().sum());
+}
+
 pub(super) fn a_square_plate_sags_under_pressure(figures: &mut Figures) {
     figures.add("square plate: deflection under 1000 Pa", sag_of_plate(16));
 }

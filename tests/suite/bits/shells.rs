@@ -75,6 +75,17 @@ fn shells_and_solids() -> Model {
     )
 }
 
+/// The lid of another thickness in each of its elements, as a mesh has it: pieces take those of their own elements.
+#[test]
+fn shells_of_many_thicknesses_have_the_same_bits() {
+    let mut model = shells_and_solids();
+    let lid = &mut model.mesh.parts[3];
+    let n = lid.n_elements();
+    let Topology::Shells { thicknesses, .. } = &mut lid.topology else { panic!("shells") };
+    *thicknesses = (0..n).map(|e| 1.5e-3 + 1e-5 * e as f64).collect();
+    same_bits(&model);
+}
+
 #[test]
 fn shells_and_solids_in_contact_have_the_same_bits_on_both_routes() {
     let model = shells_and_solids();

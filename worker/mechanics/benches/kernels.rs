@@ -245,6 +245,7 @@ fn plates(
             topology: Topology::Shells {
                 quads: quads.map(|n| [n, n + 1, n + row + 1, n + row]).collect(),
                 section,
+                thicknesses: Vec::new(),
             },
             nodes: (0..plane).collect(),
             element_ids: (0..side * side).collect(),

@@ -247,14 +247,16 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
             }
         }
         let Some(section) = part.section() else { continue };
-        for e in first..first + part.n_elements() {
-            fields[shell4::THICKNESS][e] = section.thickness;
+        for local in 0..part.n_elements() {
+            let e = first + local;
+            let thickness = part.thickness_of(local).unwrap_or(section.thickness);
+            fields[shell4::THICKNESS][e] = thickness;
             for layer in fields[shell4::ELEMENT..section.n_fields()].chunks_mut(shell4::LAYER) {
                 layer[shell4::LAYER - 1][e] = material.initial_temperature();
             }
             let volume = state.initial_volume[e];
-            let area = volume / section.thickness;
-            let radius2 = (section.thickness * section.thickness / 12.0).max(area / 8.0);
+            let area = volume / thickness;
+            let radius2 = (thickness * thickness / 12.0).max(area / 8.0);
             inertia_of[e] = material.density * volume * radius2;
         }
     }
@@ -354,11 +356,14 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
                 // A shell pulls with its section; only loads act on its face.
                 Topology::Shells { section, .. } => {
                     let area = largest_face(&x);
-                    let force = (area.sqrt() * section.thickness * strength).max(area * pressure);
+                    let thickness = part.thickness_of(e).unwrap_or(section.thickness);
+                    let force = (area.sqrt() * thickness * strength).max(area * pressure);
                     [force, area.sqrt()]
                 }
                 Topology::Trusses { area, .. } => [area * strength, 0.0],
-                Topology::Beams { section, .. } => [section.area * strength, part.volume(&x) / section.area],
+                Topology::Beams { section, .. } => {
+                    [section.area * strength, part.volume(e, &x) / section.area]
+                }
             }
         };
         // Maxima have no order; the sum of energies has one.
@@ -448,9 +453,9 @@ pub fn closing_steps(
         let volumes = part.corner_volumes(&mesh.positions);
         let thinnest = volumes.into_par_iter().enumerate().map(|(e, volume)| {
             let x = part.corners(e).map(|n| mesh.positions[n as usize]);
-            match part.section() {
+            match part.thickness_of(e) {
                 // The height above the longest side, as if it were a parallelogram.
-                Some(section) => volume / (section.thickness * longest(&[x[0], x[1], x[2], x[3]])),
+                Some(thickness) => volume / (thickness * longest(&[x[0], x[1], x[2], x[3]])),
                 None => volume / largest_face(&x),
             }
         });

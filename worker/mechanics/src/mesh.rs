@@ -80,6 +80,8 @@ pub enum Topology {
         quads: Vec<[u32; 4]>,
         /// What stands through the thickness.
         section: Section,
+        /// By element its initial thickness (length); empty where all have that of the section.
+        thicknesses: Vec<f64>,
     },
     /// Two-node trusses of one cross-section: two indices into [`Part::nodes`] each.
     Trusses {
@@ -101,7 +103,7 @@ pub enum Topology {
 /// Thickness of shells and the points through it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Section {
-    /// Initial thickness (length).
+    /// Initial thickness of elements without one of their own (length).
     pub thickness: f64,
     /// Points of integration.
     pub rule: Rule,
@@ -257,9 +259,19 @@ impl Part {
         matches!(self.topology, Topology::Shells { .. } | Topology::Beams { .. })
     }
 
-    /// Thickness of its elements, of a kind that has a thickness and no height (length).
-    pub fn thickness(&self) -> Option<f64> {
-        self.section().map(|section| section.thickness)
+    /// Initial thickness of element `e`, of a kind that has a thickness and no height (length).
+    pub fn thickness_of(&self, e: usize) -> Option<f64> {
+        match &self.topology {
+            Topology::Shells { section, thicknesses, .. } => {
+                Some(thicknesses.get(e).copied().unwrap_or(section.thickness))
+            }
+            _ => None,
+        }
+    }
+
+    /// The least of these (length).
+    pub fn least_thickness(&self) -> Option<f64> {
+        (0..self.n_elements()).filter_map(|e| self.thickness_of(e)).min_by(f64::total_cmp)
     }
 
     /// Number of nodes of an element, the first of its [`Part::nodes_of`].
@@ -305,7 +317,7 @@ impl Part {
             Topology::Tetrahedra { tetrahedra } => {
                 tet10::volume(&tetrahedra[e].map(|local| x[self.nodes[local as usize] as usize]))
             }
-            _ => self.volume(&self.corners(e).map(|n| x[n as usize])),
+            _ => self.volume(e, &self.corners(e).map(|n| x[n as usize])),
         }
     }
 
@@ -327,19 +339,22 @@ impl Part {
             | Topology::Explicit { .. }
             | Topology::EightPoint { .. }
             | Topology::Tetrahedra { .. } => hex8::volumes(self.n_elements(), &corners),
-            _ => (0..self.n_elements()).into_par_iter().map(|e| self.volume(&corners(e))).collect(),
+            _ => (0..self.n_elements()).into_par_iter().map(|e| self.volume(e, &corners(e))).collect(),
         }
     }
 
-    /// Volume of an element of this part whose [`Part::corners`] stand at `x`; of a shell, area times initial
+    /// Volume of element `e` of this part with its [`Part::corners`] at `x`; of a shell, area times initial
     /// thickness; of a tetrahedron, as if its edges were straight.
-    pub fn volume(&self, x: &[[f64; 3]; 8]) -> f64 {
+    pub fn volume(&self, e: usize, x: &[[f64; 3]; 8]) -> f64 {
         match &self.topology {
             Topology::Structured { .. }
             | Topology::Explicit { .. }
             | Topology::EightPoint { .. }
             | Topology::Tetrahedra { .. } => hex8::volume(x),
-            Topology::Shells { section, .. } => quad_area(&[x[0], x[1], x[2], x[3]]) * section.thickness,
+            Topology::Shells { section, .. } => {
+                let thickness = self.thickness_of(e).unwrap_or(section.thickness);
+                quad_area(&[x[0], x[1], x[2], x[3]]) * thickness
+            }
             Topology::Trusses { area, .. } => distance(x[0], x[1]) * area,
             Topology::Beams { section, .. } => distance(x[0], x[1]) * section.area,
         }

@@ -194,9 +194,11 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             let (tetrahedra, nodes) = by_first_use(tetrahedra, list);
             (Topology::Tetrahedra { tetrahedra }, nodes, list.clone())
         }
-        (Topology::Shells { quads, section }, Region::List(list)) => {
+        (Topology::Shells { quads, section, thicknesses }, Region::List(list)) => {
             let (quads, nodes) = by_first_use(quads, list);
-            (Topology::Shells { quads, section: section.clone() }, nodes, list.clone())
+            let of_piece = list.iter().filter_map(|&e| thicknesses.get(e as usize).copied());
+            let thicknesses = of_piece.collect();
+            (Topology::Shells { quads, section: section.clone(), thicknesses }, nodes, list.clone())
         }
         (Topology::Trusses { bars, area }, Region::List(list)) => {
             let (bars, nodes) = by_first_use(bars, list);

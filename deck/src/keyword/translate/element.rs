@@ -166,7 +166,7 @@ fn read_shells(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BT
     let (mut missing, mut thin) = (BTreeSet::new(), BTreeSet::new());
     let mut triangles: Option<(Place, usize)> = None;
     for shell in &problem.shells {
-        let Shell { id, part, nodes, thickness, at } = *shell;
+        let Shell { id, part, nodes, at, .. } = *shell;
         parts.insert(part);
         if let Some(first) = seen.insert(id, at) {
             let expected = format!("a number other than {id}, which {} has", log.line(first, at));
@@ -201,32 +201,34 @@ fn read_shells(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BT
         }
         // A section that is none of shells is told with the part.
         let of_section = match problem.sections.get(&card.section.value) {
-            Some((_, Section::Shell(shell))) => Some(shell.thickness).filter(|thickness| *thickness > 0.0),
-            _ => Some(1.0),
+            Some((_, Section::Shell(shell))) => shell.thickness,
+            _ => 1.0,
         };
-        let Some(thickness) = thickness.or(of_section) else {
+        let thickness = shell.thickness(of_section);
+        if thickness <= 0.0 || (of_section <= 0.0 && !shell.is_even()) {
             if thin.insert(part) {
                 let read = format!("shell {id} without a thickness");
                 log.fault(at, read, "T1 of its *SECTION_SHELL, or its own", "give one");
             }
             continue;
-        };
-        // Elements of a part differ by no more than rounding, or the part says so.
-        let common = *t.thicknesses.entry(part).or_insert(thickness);
-        if (thickness - common).abs() > 1e-6 * common {
-            log.fault(
-                at,
-                format!("shell {id} of thickness {}", short(thickness)),
-                format!("{}, that of the elements before it in part {part}", short(common)),
-                "make one part of the shells of each thickness",
-            );
-            continue;
         }
+        t.thicknesses.entry(part).or_insert(thickness);
         t.used.extend(nodes);
         t.turns.extend(nodes);
         let found = bodies.entry(part).or_insert_with(|| Found::of(part));
         found.body.shells.push((id, nodes));
+        found.body.thicknesses.push(thickness);
         found.places.push(at);
+    }
+    // Those of a part may differ by rounding alone.
+    for (part, found) in bodies {
+        let common = t.thicknesses.get(part).copied().unwrap_or_default();
+        if found.body.thicknesses.iter().all(|t| (t - common).abs() <= 1e-6 * common) {
+            found.body.thicknesses.clear();
+        }
+        for (thickness, at) in found.body.thicknesses.iter().zip(&found.places) {
+            t.number(*at, "a thickness of", *thickness);
+        }
     }
     if let Some((at, count)) = triangles {
         log.warn(at, format!("{count} triangles: computed as quadrilaterals with two corners in one node"));

@@ -146,7 +146,7 @@ impl Surface {
             for n in nodes {
                 index[n as usize] = 0;
             }
-            let stiffness = stiffness_of(&mesh.parts[part], bulk, area, volume);
+            let stiffness = stiffness_of(&mesh.parts[part], e, bulk, [area, volume]);
             let part = part as u32;
             let corners = corners.padded();
             faces.push(Face { nodes, element, side, part, stiffness, corners, own: [u32::MAX; MAX_NODES] });
@@ -193,7 +193,7 @@ impl Surface {
                     let sides = part.sides().iter().map(|&side| part.side(side));
                     for side in sides.filter(|side| active[n] && side.contains(&corner)) {
                         let area = area(side.map(|c| mesh.positions[corners[c] as usize]));
-                        node_stiffness[n] += stiffness_of(part, bulk, area, volume);
+                        node_stiffness[n] += stiffness_of(part, e, bulk, [area, volume]);
                         node_share[n] += of_node;
                         count[n] += 1;
                     }
@@ -351,9 +351,9 @@ impl Surface {
     }
 }
 
-/// Penalty stiffness of a side of an element of a part.
-fn stiffness_of(part: &Part, bulk: f64, area: f64, volume: f64) -> f64 {
-    match part.thickness() {
+/// Penalty stiffness of a side of element `e` of a part.
+fn stiffness_of(part: &Part, e: usize, bulk: f64, [area, volume]: [f64; 2]) -> f64 {
+    match part.thickness_of(e) {
         // As the shell itself resists in its plane: across its thickness it would rule the time step.
         Some(thickness) => bulk * thickness,
         None if volume > 0.0 => bulk * area * area / (part.spacing().side * volume),

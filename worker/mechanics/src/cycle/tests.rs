@@ -178,7 +178,7 @@ fn folding_plate() -> Domain {
     mesh.node_ids.clone_from(&nodes);
     let element_ids: Vec<u32> = (0..quads.len() as u32).collect();
     let section = Section::of(0.2, Rule::Gauss(3));
-    let topology = Topology::Shells { quads, section };
+    let topology = Topology::Shells { quads, section, thicknesses: Vec::new() };
     mesh.parts.push(Part {
         name: "plate".into(),
         material: 0,

@@ -31,7 +31,7 @@ pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, 
         },
         Topology::EightPoint { .. } => (Box::new(EightPoints::of(piece)), None),
         Topology::Tetrahedra { .. } => (Box::new(Tetrahedra::of(piece)), None),
-        Topology::Shells { quads, section } => {
+        Topology::Shells { quads, section, .. } => {
             let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);
             let mut fields = std::mem::take(&mut piece.own);
             fields.append(&mut piece.history);

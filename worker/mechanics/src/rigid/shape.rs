@@ -229,7 +229,7 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
         for e in 0..part.n_elements() {
             if parts.binary_search(&p).is_ok() {
                 let x = part.corners(e).map(|n| mesh.positions[n as usize]);
-                let limit = least_height(part, &x) / sound;
+                let limit = least_height(part, e, &x) / sound;
                 if least.is_none_or(|(other, _)| limit < other) {
                     least = Some((limit, element));
                 }
@@ -241,14 +241,14 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
 }
 
 /// Volume over the largest face; of a shell, area over the longest side; of a truss, its length.
-fn least_height(part: &Part, x: &[[f64; 3]; 8]) -> f64 {
+fn least_height(part: &Part, e: usize, x: &[[f64; 3]; 8]) -> f64 {
     match &part.topology {
         Topology::Structured { .. }
         | Topology::Explicit { .. }
         | Topology::EightPoint { .. }
         | Topology::Tetrahedra { .. } => return hex8::volume(x) / largest_face(x),
-        Topology::Trusses { area, .. } => return part.volume(x) / area,
-        Topology::Beams { section, .. } => return part.volume(x) / section.area,
+        Topology::Trusses { area, .. } => return part.volume(e, x) / area,
+        Topology::Beams { section, .. } => return part.volume(e, x) / section.area,
         Topology::Shells { .. } => {}
     }
     let corners = [x[0], x[1], x[2], x[3]];
@@ -316,7 +316,7 @@ impl Moments {
     /// Adds element `e` of a part, whose nodes stand where `at` says.
     fn add_element(&mut self, part: &Part, e: usize, at: &dyn Fn(u32) -> [f64; 3], density: f64) {
         let x = part.corners(e).map(at);
-        let mass = density * part.volume(&x);
+        let mass = density * part.volume(e, &x);
         match &part.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
                 self.add_hexahedron(&x, density)
@@ -328,7 +328,8 @@ impl Moments {
                     .for_each(|x| self.add_tetrahedron(x, density));
             }
             Topology::Shells { section, .. } => {
-                self.add_shell(&[x[0], x[1], x[2], x[3]], mass, section.thickness);
+                let thickness = part.thickness_of(e).unwrap_or(section.thickness);
+                self.add_shell(&[x[0], x[1], x[2], x[3]], mass, thickness);
             }
             // Gauss's two points give the second moments of a line, four about each those of the section.
             Topology::Beams { section, across, .. } => {

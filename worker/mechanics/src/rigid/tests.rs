@@ -114,6 +114,7 @@ fn tube(radius: f64, length: f64, thickness: f64, n: u32) -> Mesh {
         topology: Topology::Shells {
             quads: (0..n * n).map(quad).collect(),
             section: Section::of(thickness, Rule::Gauss(2)),
+            thicknesses: Vec::new(),
         },
         nodes: (0..n * (n + 1)).collect(),
         element_ids: (1..=n * n).collect(),

@@ -124,7 +124,7 @@ fn two_sheets() -> Mesh {
     let part = Part {
         name: "sheets".into(),
         material: 0,
-        topology: Topology::Shells { quads, section },
+        topology: Topology::Shells { quads, section, thicknesses: Vec::new() },
         nodes: (0..12).collect(),
         element_ids: (1..=4).collect(),
         hourglass: mechanics::element::hourglass::Hourglass::VISCOUS,
