@@ -24,6 +24,7 @@ mod material;
 mod members;
 mod mesh;
 mod mesh_alone;
+mod moving;
 mod parameter;
 mod problem;
 mod property;

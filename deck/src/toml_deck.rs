@@ -9,6 +9,7 @@ mod contact;
 mod entry;
 mod hourglass;
 pub(crate) mod joint;
+pub(crate) mod moving;
 mod output;
 mod part;
 mod row;

@@ -24,6 +24,7 @@ mod joint;
 mod law;
 mod load;
 mod modes;
+mod moving;
 mod order;
 mod perforation;
 mod porous;
@@ -145,6 +146,8 @@ macro_rules! each_case_of_the_book {
             girder: a_girder_alone_gives_the_wall_its_momentum_and_stays_symmetric_throughout quick;
             load: a_pressure_by_curve_drives_a_wave_of_its_shape quick;
             load: a_velocity_by_curve_arrives_as_it_was_prescribed quick;
+            moving: a_jet_gives_a_plate_the_impulse_of_its_way quick;
+            moving: a_load_that_crosses_a_beam_bends_it_as_timoshenko_says quick;
             load: blasts_have_the_peaks_of_another_published_fit_at_twenty_distances quick;
             load: a_transmitting_face_lets_a_pulse_out quick;
             load: shear_waves_leave_through_a_transmitting_face_too quick;

@@ -205,6 +205,15 @@ fn every_load_and_wall_has_the_same_bits_on_both_routes() {
         face = "k-max"
         pressure = { curve = "pulse", factor = 2e-3 }
         [[load]]
+        type = "moving-pressure"
+        parts = ["projectile"]
+        face = "k-max"
+        pressure = 1e-3
+        profile = "pulse"
+        radius = 1.5
+        axis = [0, 0, -1]
+        path = [[0, 2, 2, 9], [30, 5, 4, 9]]
+        [[load]]
         type = "force"
         parts = ["target"]
         face = "i-min"
@@ -262,7 +271,7 @@ fn every_load_and_wall_has_the_same_bits_on_both_routes() {
         let idle = without(&|m| m.setup.walls[wall].parts.fill(false));
         assert_ne!(idle, one.digest, "wall {wall}");
     }
-    for surface in 0..2 {
+    for surface in 0..3 {
         assert_ne!(
             without(&|m| m.setup.loads.surfaces[surface].faces.clear()),
             one.digest,
@@ -446,6 +455,15 @@ fn rigid_bodies_have_the_same_bits_on_both_routes() {
         parts = ["under"]
         face = "k-min"
         pressure = { curve = "pulse", factor = 2e-3 }
+        [[load]]
+        type = "moving-pressure"
+        parts = ["projectile"]
+        face = "k-max"
+        pressure = 1e-3
+        profile = "pulse"
+        radius = 1.5
+        axis = [0, 0, -1]
+        path = [[0, 2, 2, 9], [30, 5, 4, 9]]
         [[load]]
         type = "force"
         parts = ["under"]

@@ -103,7 +103,7 @@ pub(super) struct Motion {
 }
 
 /// How a motion follows its curve, and when.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct Driven {
     pub(super) meaning: Meaning,
     pub(super) curve: u32,

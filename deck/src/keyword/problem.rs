@@ -16,6 +16,7 @@ use super::{
     explosive::DetonationCard,
     joint::JointCard,
     material::{EosCard, MaterialCard},
+    moving::Nozzle,
     rigid::RigidCards,
     set::Sets,
 };
@@ -181,6 +182,7 @@ pub(super) struct Problem {
     /// Sets of segments through which waves leave.
     pub(super) transmitting: Vec<(Place, u32)>,
     pub(super) blasts: Blasts,
+    pub(super) nozzles: Vec<Nozzle>,
     /// Rate of mass damping (1/time); 0 without.
     pub(super) damping: f64,
     pub(super) conditions: Conditions,

@@ -10,6 +10,7 @@ mod hourglass;
 mod joint;
 mod material;
 mod motion;
+mod moving;
 mod output;
 mod part;
 mod rigid;
@@ -48,6 +49,7 @@ pub(super) fn translate(
     condition::write_transmitting(&mut t);
     explosive::write_detonations(&mut t);
     blast::write(&mut t);
+    moving::write(&mut t);
     condition::write_gravity(&mut t);
     condition::write_part_gravities(&mut t);
     condition::write_damping(&mut t);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use mechanics::load::{
     Gravity, Loads, MAX_FORCES, NodalForce, Relaxation, SurfaceKind, SurfaceLoad,
     blast::{Burst, Charge},
+    moving::{MovingPressure, Path},
 };
 
 use super::{
@@ -63,6 +64,18 @@ pub(super) fn make(
                 {
                     let kind = SurfaceKind::Blast(draft.list.charges.len() as u32);
                     draft.list.charges.push(charge);
+                    draft.list.surfaces.push(SurfaceLoad { kind, faces });
+                }
+            }
+            LoadKind::Moving { moving, faces } => {
+                let asking = Asking { at: load.at, title: &load.title, selected: &selected };
+                let faces = match faces {
+                    Some(faces) => region::faces(faces, &asking, parts, assembly, log),
+                    None => Vec::new(),
+                };
+                if let Some(moving) = moving.as_ref().and_then(|given| moving_pressure(given, curves)) {
+                    let kind = SurfaceKind::Moving(draft.list.moving.len() as u32);
+                    draft.list.moving.push(moving);
                     draft.list.surfaces.push(SurfaceLoad { kind, faces });
                 }
             }
@@ -130,6 +143,30 @@ fn exploding(
     // Faces that fly towards it may come twice as near.
     charge.greatest = charge.reflected_peak(0.5 * nearest);
     Some(charge)
+}
+
+/// A pressure that moves; none after a fault.
+fn moving_pressure(given: &condition::Moving, curves: &Curves<'_>) -> Option<MovingPressure> {
+    let pressure = curves.drive(&given.pressure);
+    let profile = match &given.profile {
+        Some(name) => Some(curves.drive(&condition::Drive::along(name.clone(), 1.0))?.curve?),
+        None => None,
+    };
+    let path = match &given.path {
+        condition::Path::Velocity { start, velocity } => {
+            Path::Velocity { start: *start, velocity: curves.components(velocity)? }
+        }
+        condition::Path::Places(places) => Path::Places(places.clone()),
+    };
+    let axis = region::unit(given.axis);
+    Some(MovingPressure {
+        pressure: pressure?,
+        profile,
+        radius: given.radius,
+        axis,
+        path,
+        points: given.points,
+    })
 }
 
 /// Adds a force on some nodes.

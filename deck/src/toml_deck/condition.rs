@@ -5,8 +5,9 @@ use mechanics::{
     load::{Span, blast::Burst},
 };
 
-use super::entry::{
-    AXES, circle, components, direction, drive, faces, nodes, parts, parts_of, region, span, text,
+use super::{
+    entry::{AXES, circle, components, direction, drive, faces, nodes, parts, parts_of, region, span, text},
+    moving,
 };
 use crate::{
     limits::{MAX_CURVE_POINTS, MAX_ENTRIES},
@@ -276,11 +277,11 @@ pub(super) fn read_masses(deck: &Table<'_>) -> Vec<Lumped> {
 
 /// Reads every `[[load]]`.
 pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
-    const TYPES: [&str; 4] = ["pressure", "force", "acceleration", "blast"];
+    const TYPES: [&str; 5] = ["pressure", "force", "acceleration", "blast", "moving-pressure"];
     let mut loads = Vec::new();
     for table in deck.tables("load", MAX_ENTRIES) {
         let kind = table
-            .require("type", "one of pressure, force, acceleration, blast")
+            .require("type", "one of pressure, force, acceleration, blast, moving-pressure")
             .and_then(|v| v.one_of(&TYPES));
         // Which keys belong depends on the type, so without one none is called unknown.
         let Some(kind) = kind else { continue };
@@ -292,6 +293,9 @@ pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
                 LoadKind::Pressure { pressure, faces: faces(&table) }
             }
             "blast" => LoadKind::Blast { charge: read_charge(&table), faces: faces(&table) },
+            "moving-pressure" => {
+                LoadKind::Moving { moving: moving::read(&table).map(Box::new), faces: faces(&table) }
+            }
             kind => {
                 let force = table.vector(kind);
                 let drive = Drive { span: span(&table), ..drive_of(&table) };

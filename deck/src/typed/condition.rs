@@ -213,6 +213,11 @@ pub(crate) enum LoadKind {
         charge: Option<Charge>,
         faces: Option<Faces>,
     },
+    /// A pressure that moves over faces.
+    Moving {
+        moving: Option<Box<Moving>>,
+        faces: Option<Faces>,
+    },
     /// On each node; by its mass it is an acceleration.
     Force {
         force: Option<[f64; 3]>,
@@ -231,6 +236,29 @@ pub(crate) struct Charge {
     pub(crate) span: Span,
     pub(crate) burst: Burst,
     pub(crate) negative: bool,
+}
+
+/// A pressure by the distance from an axis that moves.
+#[derive(Clone, Debug)]
+pub(crate) struct Moving {
+    pub(crate) pressure: Drive,
+    /// Name of the curve of its share over the distance.
+    pub(crate) profile: Option<Placed<String>>,
+    pub(crate) radius: f64,
+    /// Of any length above 0.
+    pub(crate) axis: [f64; 3],
+    pub(crate) path: Path,
+    /// Points of integration along each side of a face.
+    pub(crate) points: u32,
+}
+
+/// The way of a point.
+#[derive(Clone, Debug)]
+pub(crate) enum Path {
+    /// From a place at the start by velocities; an axis without one stays.
+    Velocity { start: [f64; 3], velocity: Components },
+    /// Time, x, y, z; times ascend, at least one.
+    Places(Vec<[f64; 4]>),
 }
 
 /// An acceleration of everything.

@@ -4,12 +4,12 @@ use mechanics::load::{Span, blast::Burst};
 
 use super::value::{Text, circle, components, drive, list, names, numbers, quoted, span, table, vector};
 use crate::{
-    toml_deck::joint::KINDS,
+    toml_deck::{joint::KINDS, moving::USUAL_POINTS},
     typed::{
         Deck,
         condition::{
-            Boundary, BoundaryKind, Components, Drive, Faces, Joint, Load, LoadKind, Parts, Region, Rigid,
-            Wall, WallMotion, WallShape,
+            Boundary, BoundaryKind, Components, Drive, Faces, Joint, Load, LoadKind, Moving, Parts, Path,
+            Region, Rigid, Wall, WallMotion, WallShape,
         },
     },
 };
@@ -211,6 +211,11 @@ fn write_load(text: &mut Text, load: &Load) {
                 }
             }
         }
+        LoadKind::Moving { moving, faces } => {
+            text.key("type", quoted("moving-pressure"));
+            write_faces(text, faces.as_ref());
+            moving.iter().for_each(|moving| write_moving(text, moving));
+        }
         LoadKind::Force { force, by_mass, drive, nodes } => {
             let kind = if *by_mass { "acceleration" } else { "force" };
             text.key("type", quoted(kind));
@@ -225,6 +230,25 @@ fn write_load(text: &mut Text, load: &Load) {
         }
     }
     write_parts(text, &load.parts);
+}
+
+fn write_moving(text: &mut Text, moving: &Moving) {
+    text.key("pressure", drive(&moving.pressure));
+    if let Some(profile) = &moving.profile {
+        text.key("profile", quoted(&profile.value));
+    }
+    text.key("radius", format!("{:?}", moving.radius));
+    text.key("axis", vector(moving.axis));
+    text.some("points", Some(moving.points).filter(|points| *points != USUAL_POINTS));
+    match &moving.path {
+        Path::Velocity { start, velocity } => {
+            text.key("point", vector(*start));
+            if velocity.iter().any(Option::is_some) {
+                text.key("velocity", components(velocity));
+            }
+        }
+        Path::Places(places) => text.key("path", list(places.iter().map(|place| numbers(place)))),
+    }
 }
 
 fn write_wall(text: &mut Text, wall: &Wall) {

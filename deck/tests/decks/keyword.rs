@@ -10,6 +10,7 @@ mod hourglass;
 mod joints;
 mod laminates;
 mod laws;
+mod moving;
 mod mutations;
 mod records;
 mod rigid;

@@ -333,6 +333,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         .map(|surface| match surface.kind {
             SurfaceKind::Pressure(drive) => drive.greatest(curves),
             SurfaceKind::Blast(charge) => setup.loads.charges[charge as usize].greatest,
+            SurfaceKind::Moving(load) => setup.loads.moving[load as usize].greatest(curves),
             SurfaceKind::Transmit => 0.0,
         })
         .fold(0.0, f64::max);

@@ -6,6 +6,7 @@
 
 pub mod blast;
 pub(crate) mod face;
+pub mod moving;
 
 use serde::{Deserialize, Serialize};
 
@@ -179,6 +180,8 @@ pub struct Loads {
     pub surfaces: Vec<SurfaceLoad>,
     /// Charges that explode in air, which loads on faces name.
     pub charges: Vec<blast::Charge>,
+    /// Pressures that move, which loads on faces name.
+    pub moving: Vec<moving::MovingPressure>,
     /// Dynamic relaxation.
     pub relaxation: Option<Relaxation>,
 }
@@ -230,6 +233,8 @@ pub enum SurfaceKind {
     Pressure(Drive),
     /// The pressure of a charge that explodes in air, by its index in [`Loads::charges`].
     Blast(u32),
+    /// A pressure that moves over the faces, by its index in [`Loads::moving`].
+    Moving(u32),
     /// Dampers that take up plane waves which leave through the face (Lysmer and Kuhlemeyer 1969): traction
     /// `-rho (c_l v_n n + c_s v_t)` with the wave speeds of the material at rest.
     Transmit,

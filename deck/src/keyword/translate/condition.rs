@@ -4,10 +4,13 @@ use std::collections::{BTreeMap, HashMap};
 
 use mechanics::load::{MAX_FORCES, Span};
 
-use super::state::Translation;
+use super::{moving::is_of_nozzle, state::Translation};
 use crate::{
     geometry::{dot, sub, unit},
-    keyword::condition::{AXES_OF_CODE, Driven, Meaning, Target, Way},
+    keyword::{
+        condition::{AXES_OF_CODE, Driven, Meaning, Target, Way},
+        problem::Problem,
+    },
     place::Place,
     typed::condition::{
         Boundary, BoundaryKind, Circle, Components, Drive, Faces, Gravity, Load, LoadKind, Lumped, Parts,
@@ -106,7 +109,9 @@ pub(super) fn write_motions(t: &mut Translation<'_>) {
         let nodes = t.nodes(given.target, given.at);
         let Some(drive) = driven(t, &given.how, given.at) else { continue };
         if nodes.is_empty() {
-            t.log.warn(given.at, "a motion of no node that has an element");
+            if !is_of_nozzle(t, given) {
+                t.log.warn(given.at, "a motion of no node that has an element");
+            }
             continue;
         }
         let nodes = Some(Region::Set(t.set(&format!("motion {}", n + 1), nodes, given.at)));
@@ -295,23 +300,35 @@ fn push_load(t: &mut Translation<'_>, at: Place, title: &str, kind: LoadKind) {
     t.deck.loads.push(Load { at, title: title.to_string(), parts: Parts::All, kind });
 }
 
+/// The nodes of each outer face as they stand around its outward normal, by these nodes ascending: of solids, and of shells, whose upper side
+/// is the outer one, where they are wanted.
+pub(super) fn outward(problem: &Problem, of_shells: bool) -> HashMap<[u32; 4], [u32; 4]> {
+    let mut outward: HashMap<[u32; 4], [u32; 4]> = HashMap::new();
+    let sorted = |mut face: [u32; 4]| {
+        face.sort_unstable();
+        face
+    };
+    for solid in &problem.solids {
+        for face in mechanics::mesh::FACES.map(|face| face.map(|c| solid.nodes[c])) {
+            // A face of two elements is inside, and no pressure acts there.
+            if outward.insert(sorted(face), face).is_some() {
+                outward.remove(&sorted(face));
+            }
+        }
+    }
+    for shell in problem.shells.iter().filter(|_| of_shells) {
+        outward.entry(sorted(shell.nodes)).or_insert(shell.nodes);
+    }
+    outward
+}
+
 /// Pressures, by whether segments are listed outward.
 pub(super) fn write_pressures(t: &mut Translation<'_>) {
     let (problem, log) = (t.problem, t.log);
     if problem.conditions.pressures.is_empty() {
         return;
     }
-    let mut outward: HashMap<[u32; 4], [u32; 4]> = HashMap::new();
-    for solid in &problem.solids {
-        for face in mechanics::mesh::FACES.map(|face| face.map(|c| solid.nodes[c])) {
-            let mut key = face;
-            key.sort_unstable();
-            // A face of two elements is inside, and no pressure acts there.
-            if outward.insert(key, face).is_some() {
-                outward.remove(&key);
-            }
-        }
-    }
+    let outward = outward(problem, false);
     // Faces by curve, factor and side.
     type Group = (Place, Vec<[u32; 4]>);
     let mut groups: BTreeMap<(u32, u64), Group> = BTreeMap::new();

@@ -3,7 +3,7 @@
 //! A face is the bilinear surface through its corners; what acts on it goes to the corners by their shape functions. A
 //! uniform pressure on all faces of an element is then exactly its pressure times the volume gradient.
 
-use super::{Loads, SurfaceKind};
+use super::{Loads, SurfaceKind, moving::Moment};
 use crate::{
     block::Block,
     element::hex8,
@@ -75,7 +75,7 @@ pub(crate) fn faces_of(block: &Block, loads: &Loads, material: &Material) -> Vec
 }
 
 /// Area vectors of the corners of a bilinear face, outward: `integral of N_I n dA`.
-fn corner_areas(x: [[f64; 3]; 4]) -> [[f64; 3]; 4] {
+pub(super) fn corner_areas(x: [[f64; 3]; 4]) -> [[f64; 3]; 4] {
     let (a, b, c, d) = (minus(x[1], x[0]), minus(x[2], x[1]), minus(x[2], x[3]), minus(x[3], x[0]));
     let products = [cross(a, d), cross(a, b), cross(c, b), cross(c, d)];
     std::array::from_fn(|i| {
@@ -103,6 +103,7 @@ pub(crate) fn apply(
 ) -> FaceVote {
     let mut vote = FaceVote { force_bound: 0.0, limit: f64::INFINITY };
     let damping = 8.0 * block.hourglass.damping() + 2.0 * control.linear_viscosity;
+    let moments: Vec<Moment<'_>> = loads.moving.iter().map(|load| load.at(&loads.curves, time)).collect();
     for face in faces {
         let nodes = face.nodes;
         let at = |values: &[Vec<f64>; 3], n: usize| [values[0][n], values[1][n], values[2][n]];
@@ -121,7 +122,11 @@ pub(crate) fn apply(
                 let normal = if size > 0.0 { across.map(|c| c / size) } else { across };
                 loads.charges[charge as usize].pressure(centre, normal, time)
             }
-            SurfaceKind::Pressure(_) | SurfaceKind::Transmit => 0.0,
+            SurfaceKind::Pressure(_) | SurfaceKind::Moving(_) | SurfaceKind::Transmit => 0.0,
+        };
+        let moving = match kind {
+            SurfaceKind::Moving(load) => moments[load as usize].forces(&nodes.map(|n| at(&block.x, n))),
+            _ => [[0.0; 3]; 4],
         };
         for (corner, &n) in nodes.iter().enumerate() {
             let (area, v) = (areas[corner], velocities[corner]);
@@ -131,6 +136,7 @@ pub(crate) fn apply(
                     area.map(|c| c * tension)
                 }
                 SurfaceKind::Blast(_) => area.map(|c| c * -blast),
+                SurfaceKind::Moving(_) => moving[corner],
                 SurfaceKind::Transmit => {
                     let size = norm(area);
                     let normal = if size > 0.0 { area.map(|c| c / size) } else { area };
