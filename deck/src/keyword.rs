@@ -31,6 +31,7 @@ mod property;
 mod read;
 mod rigid;
 mod set;
+mod stress;
 mod translate;
 mod transmit;
 mod unit;

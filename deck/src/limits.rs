@@ -13,6 +13,8 @@ pub const MAX_CONTACT_PARTS: usize = 2_000;
 pub const MAX_PARTS: usize = 10_000;
 /// Most entries of any other array of tables.
 pub const MAX_ENTRIES: usize = 10_000;
+/// Most entries of stress at the start: a formed sheet has one for each element.
+pub(crate) const MAX_STRESSES: usize = 1_000_000;
 /// Most pairs of parts whose contact force is written: each has four columns.
 pub(crate) const MAX_CONTACT_FORCES: usize = 64;
 /// Most cross-sections: each has nine columns.

@@ -26,6 +26,7 @@ mod region;
 mod rigid;
 mod section;
 mod spans;
+mod stress;
 mod surface;
 mod symmetry;
 mod tie;
@@ -103,6 +104,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         }
     }
 
+    let stress = stress::make(deck, &names, &assembly.mesh, (&materials, &rigid), log);
     let mut velocity = assembly.velocity;
     for (node, index) in conditions.constraint.iter().enumerate() {
         let held = &conditions.constraints[*index as usize];
@@ -132,6 +134,7 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
         spin: assembly.spin,
         axes,
         scatter,
+        stress,
         constraint: conditions.constraint,
         join_energy: assembly.join_energy,
         setup: Setup {

@@ -3,6 +3,7 @@
 use mechanics::{
     cross_section::CrossSection,
     failure::scatter::Scatter,
+    initial::InitialStress,
     mesh::{Mesh, SolidAxes},
     setup::Setup,
 };
@@ -55,6 +56,8 @@ pub struct Model {
     pub axes: Vec<SolidAxes>,
     /// How the strength of elements scatters, of the parts in which it does.
     pub scatter: Vec<Scatter>,
+    /// Stress and plastic strain at the start, of the elements that have any; each element at most once.
+    pub stress: Vec<InitialStress>,
     /// Index into `setup.constraints` by global node index; 0 is free.
     pub constraint: Vec<u16>,
     /// Kinetic energy lost where joined nodes of different velocity merged.
@@ -76,12 +79,13 @@ impl Model {
             spin,
             axes,
             scatter,
+            stress,
             constraint,
             join_energy,
             setup: _,
             output: _,
         } = self;
-        (title, units, mesh, velocity, spin, axes, scatter, constraint, join_energy)
+        (title, units, mesh, velocity, spin, axes, scatter, stress, constraint, join_energy)
     }
 }
 

@@ -15,6 +15,7 @@ mod part;
 mod row;
 mod shape;
 mod shell;
+mod stress;
 
 use toml::de::DeTable;
 
@@ -121,6 +122,7 @@ fn read_document(document: &DeTable<'_>, log: &Log<'_>) -> Deck {
     deck.loads = condition::read_loads(&table);
     deck.gravity = condition::read_gravity(&table);
     deck.relaxation = condition::read_relaxation(&table);
+    deck.stresses = stress::read(&table);
     deck.boundaries = condition::read_boundaries(&table);
     deck.symmetry = symmetry;
     deck.walls = condition::read_walls(&table);

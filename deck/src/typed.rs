@@ -10,6 +10,7 @@ pub(crate) mod condition;
 pub(crate) mod contact;
 pub(crate) mod mesh;
 pub(crate) mod part;
+pub(crate) mod stress;
 
 use mechanics::{burn::Detonation, element::hourglass::Hourglass};
 
@@ -20,6 +21,7 @@ use crate::{
 use condition::{Boundary, Curve, Gravity, Joint, Load, Lumped, Parts, Region, Relaxation, Rigid, Wall};
 use contact::{Contact, Join};
 use part::{Own, Part};
+use stress::Stress;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Deck {
@@ -40,6 +42,7 @@ pub(crate) struct Deck {
     pub(crate) loads: Vec<Load>,
     pub(crate) gravity: Option<Gravity>,
     pub(crate) relaxation: Option<Relaxation>,
+    pub(crate) stresses: Vec<Stress>,
     pub(crate) contact: Option<Contact>,
     /// Whether the deck asks for contact, be it in a way that could not be read.
     pub(crate) has_contact: bool,
@@ -70,6 +73,7 @@ impl Deck {
             loads: Vec::new(),
             gravity: None,
             relaxation: None,
+            stresses: Vec::new(),
             contact: None,
             has_contact: false,
             erosion: None,

@@ -4,6 +4,7 @@
 
 mod condition;
 mod part;
+mod stress;
 mod value;
 
 use mechanics::{contact::Limit, material::Material};
@@ -30,6 +31,7 @@ pub(crate) fn text(deck: &Deck) -> String {
         text.key("tolerance", format!("{:?}", join.tolerance));
     }
     condition::write(&mut text, deck);
+    deck.stresses.iter().for_each(|stress| stress::write(&mut text, stress));
     if let Some(symmetry) = &deck.symmetry {
         text.heading("[symmetry]");
         let planes = ["x", "y", "z"].into_iter().zip(symmetry.planes).filter(|(_, has)| *has);

@@ -34,6 +34,7 @@ mod shell;
 mod soft;
 mod solid;
 mod spheres;
+mod stress;
 mod structure;
 mod wave;
 mod zone;
@@ -158,6 +159,10 @@ macro_rules! each_case_of_the_book {
             load: a_driven_wall_pushes_as_a_bar_that_strikes_it_is_pushed quick;
             load: a_wall_gives_the_impulse_that_bodies_lack_and_rubs_after_coulomb quick;
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
+            stress: a_pulled_bar_that_is_let_go_unloads_by_a_wave quick;
+            stress: plates_in_equilibrium_stay_as_they_are quick;
+            stress: a_bent_strip_springs_back quick;
+            stress: plastic_strain_at_the_start_has_hardened quick;
             erosion: an_element_that_leaves_a_block_uncovers_its_neighbours quick;
             erosion: a_rod_goes_through_a_plate_and_energies_add_up long;
             erosion: a_torn_sheet_closes_its_account_of_energy quick;

@@ -5,6 +5,7 @@
 mod compare;
 mod edges;
 mod shells;
+mod stress;
 mod threads;
 
 use std::sync::Arc;

@@ -19,6 +19,7 @@ use super::{
     moving::Nozzle,
     rigid::RigidCards,
     set::Sets,
+    stress::StressCard,
 };
 use crate::place::{Origin, Place, Placed};
 
@@ -185,6 +186,8 @@ pub(super) struct Problem {
     pub(super) nozzles: Vec<Nozzle>,
     /// Rate of mass damping (1/time); 0 without.
     pub(super) damping: f64,
+    /// Stress at the start.
+    pub(super) stresses: Vec<StressCard>,
     pub(super) conditions: Conditions,
     pub(super) rigid: RigidCards,
     pub(super) joints: Vec<JointCard>,

@@ -15,7 +15,7 @@ use super::{
     problem::{Problem, UnitsCard},
     property,
     rigid::RigidCards,
-    transmit,
+    stress, transmit,
 };
 use crate::{log::Log, place::Place};
 
@@ -177,6 +177,8 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
             let (id, limits) = erosion::read(block, context);
             problem.erosions.entry(id).or_default().merge(limits);
         }
+        word if stress::knows(word) => stress::read(problem, block, context),
+        word if stress::is_of_strain(word) => log.ignore(block.at, word),
         word if RigidCards::knows(word) => problem.rigid.read(block, &problem.vectors, context),
         word if joint::knows(word) => joint::read(&mut problem.joints, block, context),
         word if word.starts_with("SET_") => problem.sets.read(block, context),

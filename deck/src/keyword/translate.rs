@@ -15,6 +15,7 @@ mod output;
 mod part;
 mod rigid;
 mod state;
+mod stress;
 mod switch;
 
 use super::problem::Problem;
@@ -53,6 +54,7 @@ pub(super) fn translate(
     condition::write_gravity(&mut t);
     condition::write_part_gravities(&mut t);
     condition::write_damping(&mut t);
+    stress::write(&mut t);
     condition::write_masses(&mut t);
     condition::write_walls(&mut t);
     contact::write(&mut t);

@@ -15,6 +15,7 @@ mod mutations;
 mod records;
 mod rigid;
 mod spans;
+mod stress;
 
 use std::{fs, path::Path};
 

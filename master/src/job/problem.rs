@@ -50,6 +50,7 @@ impl Problem {
         initial::spin(&mut start, &setup.constraints, &model.spin);
         initial::axes(&mut start, &model.mesh, &setup.materials, &model.axes).map_err(Error::Problem)?;
         initial::scatter(&mut start, &model.mesh, &model.scatter);
+        initial::stress(&mut start, &model.mesh, &setup, &model.stress).map_err(Error::Problem)?;
         let quanta = initial::quanta(&model.mesh, &setup, &start);
         if setup != model.setup {
             Arc::make_mut(&mut model).setup = setup;

@@ -1,6 +1,10 @@
 //! The state a run starts from: masses by the shares of element masses that their nodes carry and those that a deck puts at nodes, elements at rest volume without deviatoric stress,
 //! gases at their pressure, explosives with the time until they are lit.
 
+mod stress;
+
+pub use stress::{InitialStress, PointStress, Points, stress, stress_fault};
+
 use rayon::prelude::*;
 
 use crate::{
@@ -38,7 +42,7 @@ pub fn state(
         time: 0.0,
         x: mesh.positions.clone(),
         v: velocity.to_vec(),
-        mass: vec![0.0; mesh.n_nodes()],
+        mass: Vec::new(),
         constraint: constraint.to_vec(),
         initial_volume: Vec::with_capacity(n_elements),
         elements: std::array::from_fn(|_: usize| vec![0.0; n_elements]),
@@ -52,11 +56,8 @@ pub fn state(
     if let Some(settings) = &setup.contact {
         settings.bind(&mut state.contact);
     }
-    let mut mass_of = Vec::with_capacity(n_elements);
     for (p, part) in (0..).zip(&mesh.parts) {
         let material = &setup.materials[part.material as usize];
-        let body = setup.bodies.iter().find(|body| body.parts.binary_search(&p).is_ok());
-        let density = material.density * body.map_or(1.0, |body| body.nodal_scale);
         let variables = part.columns(material);
         if !variables.is_empty() {
             let mut columns: Vec<Vec<f64>> =
@@ -74,7 +75,6 @@ pub fn state(
                     part.element_ids[e], part.name
                 ));
             }
-            mass_of.push(density * v);
         }
         // Zeros stay unwritten.
         for (field, value) in [
@@ -105,24 +105,39 @@ pub fn state(
         }
     }
     debug_assert_eq!(state.elements.len(), N_FIELDS);
+    state.mass = masses(mesh, setup, &state.initial_volume);
+    shells(mesh, setup, &mut state);
+    Ok(state)
+}
+
+/// Nodal masses of elements of these initial volumes, and those that a deck puts at nodes.
+fn masses(mesh: &Mesh, setup: &Setup, initial_volume: &[f64]) -> Vec<f64> {
+    let mut mass_of = Vec::with_capacity(initial_volume.len());
+    for (p, part) in (0..).zip(&mesh.parts) {
+        let body = setup.bodies.iter().find(|body| body.parts.binary_search(&p).is_ok());
+        let density =
+            setup.materials[part.material as usize].density * body.map_or(1.0, |body| body.nodal_scale);
+        let of_part = mass_of.len()..mass_of.len() + part.n_elements();
+        mass_of.extend(initial_volume[of_part].iter().map(|volume| density * volume));
+    }
     let masses = mass_of.iter().copied().chain(mesh.lumped.iter().map(|(_, mass)| *mass));
     let heaviest = masses.fold(f64::MIN_POSITIVE, f64::max);
     // 64 shares at a node stay below 2^53 quanta.
     let quantum = Quantum::for_reference(heaviest, 50);
+    let mut nodal = vec![0.0; mesh.n_nodes()];
     let mut index = 0;
     for part in &mesh.parts {
         for e in 0..part.n_elements() {
             for (&n, share) in part.nodes_of(e).iter().zip(part.shares(e)) {
-                state.mass[n as usize] += quantum.round(mass_of[index] * share);
+                nodal[n as usize] += quantum.round(mass_of[index] * share);
             }
             index += 1;
         }
     }
     for &(n, mass) in &mesh.lumped {
-        state.mass[n as usize] += quantum.round(mass);
+        nodal[n as usize] += quantum.round(mass);
     }
-    shells(mesh, setup, &mut state);
-    Ok(state)
+    nodal
 }
 
 /// Gives elements the axes of their material.
@@ -344,7 +359,6 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         let material = &setup.materials[part.material as usize];
         let modulus = material.wave_modulus();
         sound = sound.max((modulus / material.density).sqrt());
-        driven2 = driven2.max(2.0 * material.initial_energy() / material.density);
         let strength = modulus.max(material.density * top_speed2).max(pressure);
         // Force and arm of an element.
         let of_element = |e: usize| {
@@ -374,7 +388,9 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
             .reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
         (force, arm) = (force.max(of_part), arm.max(longest));
         for _ in 0..part.n_elements() {
-            stored += (1e-3 * material.bulk()).max(material.initial_energy()) * state.initial_volume[index];
+            let energy = state.elements[field::ENERGY][index];
+            stored += (1e-3 * material.bulk()).max(energy) * state.initial_volume[index];
+            driven2 = driven2.max(2.0 * energy / material.density);
             index += 1;
         }
     }

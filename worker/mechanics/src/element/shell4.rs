@@ -34,6 +34,7 @@ use crate::{element::vector::Vector, lanes::scalar::Scalar};
 pub(crate) use block::Core;
 pub use block::ShellStep;
 pub use kernel::{ELEMENT, THICKNESS};
+pub(crate) use kernel::{INTERNAL, SHEAR};
 pub use layers::LAYER;
 pub use section_error::SectionError;
 pub use shells::Shells;

@@ -127,6 +127,7 @@ fn gravity_relaxation_and_nodal_force_change_the_velocity_and_book_their_work() 
         gravity: Some(Gravity { acceleration: [0.0, 0.0, -10.0], drive }),
         surfaces: Vec::new(),
         charges: Vec::new(),
+        moving: Vec::new(),
         relaxation: Some(Relaxation { factor: 0.9, rate: 0.0, until: 0.6 }),
     };
     let pushed = Constraint { forces: 1, ..Constraint::default() };

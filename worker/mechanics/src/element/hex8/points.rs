@@ -8,10 +8,10 @@ use crate::{
 };
 
 /// Points of an element: one lane set.
-pub(super) const POINTS: usize = SET;
+pub(crate) const POINTS: usize = SET;
 
 /// The fields that each point has, indices into [`crate::state::FIELDS`].
-pub(super) const OF_POINT: [usize; 8] = [SXX, SYY, SXY, SYZ, SZX, PLASTIC_STRAIN, TEMPERATURE, DAMAGE];
+pub(crate) const OF_POINT: [usize; 8] = [SXX, SYY, SXY, SYZ, SZX, PLASTIC_STRAIN, TEMPERATURE, DAMAGE];
 
 /// Number of arrays that such elements have of their own ([`crate::piece::Piece::own`]): field by field, those of the points.
 pub(crate) const N_OWN: usize = OF_POINT.len() * POINTS;

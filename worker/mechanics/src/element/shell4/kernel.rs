@@ -22,7 +22,7 @@ pub(crate) const INTERNAL: usize = 7;
 pub(crate) const HOURGLASS: usize = 8;
 
 /// Shear correction of a homogeneous plate.
-pub(super) const SHEAR: f64 = 5.0 / 6.0;
+pub(crate) const SHEAR: f64 = 5.0 / 6.0;
 /// Share of the hourglass stiffness left where all layers yield. More of it carries load: benches/TRIED.md has a tube of three meshes.
 const SOFT: f64 = 0.02;
 /// The section and hourglass control resist rates of strain: by what an elastic section gains in stress within this part of a step. A

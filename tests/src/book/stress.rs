@@ -1,0 +1,137 @@
+//! Stress and plastic strain at the start: a bar that is let go, plates in equilibrium, springback, hardening that is over.
+
+use deck::Model;
+use mechanics::state::{GlobalState, field};
+
+use crate::{
+    case::Figures,
+    solve::{Solved, crossing, model, run, run_with_states},
+};
+
+/// Young's modulus 200 GPa, density 8000, no Poisson's ratio: waves of 5000 m/s.
+const ELASTIC: &str = "{ density = 8000, eos = { type = \"linear\", bulk = 66.66666666666667e9 }, \
+                       strength = { type = \"elastic\", shear = 100e9 } }";
+
+fn head(end: &str, rest: &str) -> String {
+    format!("title = \"stressed\"\nunits = \"SI\"\n[control]\n{end}\n[output]\nhistory_cycles = 1\n{rest}")
+}
+
+/// A bar of 0.1 m that is pulled with 100 MPa and held at both ends until one is let go at the start.
+pub(super) fn a_pulled_bar_that_is_let_go_unloads_by_a_wave(figures: &mut Figures) {
+    let deck = head(
+        "end_time = 18e-6",
+        &format!(
+            "period = 15e-6\n[[part]]\nname = \"bar\"\nmaterial = {ELASTIC}\n\
+             box = {{ origin = [0, 0, 0], size = [0.1, 5e-4, 5e-4], cells = [200, 1, 1] }}\n\
+             [[boundary]]\ntype = \"fixed\"\nface = \"i-min\"\n\
+             [[initial_stress]]\nstress = [100e6, 0, 0, 0, 0, 0]\n\
+             [[gauge]]\nname = \"middle\"\npoint = [0.05, 0, 0]\n[[gauge]]\nname = \"end\"\npoint = [0.1, 0, 0]\n"
+        ),
+    );
+    let solved = run_with_states(model(&deck));
+    figures.add("bar let go: velocity of its end", solved.gauge_mean(1, 5e-6, 15e-6, |g| g.v[0]));
+    let middle = solved.gauge(0).map(|(time, g)| (time, -g.v[0]));
+    figures.add("bar let go: arrival in the middle", crossing(middle, 1.25).expect("the wave gets there"));
+    let stress =
+        |state: &GlobalState, e: usize| state.elements[field::SXX][e] - state.elements[field::PRESSURE][e];
+    let state = solved.state_at(15e-6);
+    let of = |from: f64, to: f64| solved.element_mean(state, 0, |[x, _, _]| (from..to).contains(&x), stress);
+    figures.add("bar let go: stress behind the wave", of(0.04, 0.09));
+    figures.add("bar let go: stress ahead of it", of(0.0, 0.015));
+    // What it held at the start, half the stress squared over Young's modulus in its volume.
+    let first = &solved.rows[0];
+    figures.add("bar let go: internal energy at the start", first.internal / (0.1 * 5e-4 * 5e-4));
+    figures.add("bar let go: energy error", solved.outcome.run_totals.last.error);
+}
+
+/// The greatest change of a stress, over the greatest of all.
+fn change(solved: &Solved) -> f64 {
+    let first = &solved.states[0];
+    let of = |state: &GlobalState, k: usize| state.elements[k].clone();
+    let mut most = (0.0_f64, 0.0_f64);
+    for k in [field::SXX, field::SYY, field::SXY, field::SYZ, field::SZX, field::PRESSURE] {
+        for (now, before) in of(&solved.state, k).into_iter().zip(of(first, k)) {
+            most = (most.0.max((now - before).abs()), most.1.max(before.abs()));
+        }
+    }
+    assert!(most.1 > 1e6, "a plate without stress");
+    most.0 / most.1
+}
+
+/// Plates in equilibrium, held at their edges: of each kind of solid and of shells.
+pub(super) fn plates_in_equilibrium_stay_as_they_are(figures: &mut Figures) {
+    const KINDS: [(&str, &str); 4] = [
+        ("hexahedra", "box = { origin = [0, 0, 0], size = [8e-3, 8e-3, 2e-3], cells = [8, 8, 2] }"),
+        (
+            "eight points",
+            "points = 8\nbox = { origin = [0, 0, 0], size = [8e-3, 8e-3, 2e-3], cells = [8, 8, 2] }",
+        ),
+        (
+            "shells",
+            "shell = { thickness = 1e-3 }\nplate = { origin = [0, 0, 0], side_i = [6.4e-3, 4.8e-3, 0], \
+             side_j = [-4.8e-3, 6.4e-3, 0], cells = [8, 8] }",
+        ),
+        (
+            "membranes of four points",
+            "shell = { thickness = 1e-3, in_plane = 4, membrane = true }\n\
+             plate = { origin = [0, 0, 0], side_i = [6.4e-3, 4.8e-3, 0], side_j = [-4.8e-3, 6.4e-3, 0], cells = [8, 8] }",
+        ),
+    ];
+    for (kind, shape) in KINDS {
+        let held: String = ["i-min", "i-max", "j-min", "j-max"]
+            .map(|face| format!("[[boundary]]\ntype = \"fixed\"\nface = \"{face}\"\n"))
+            .concat();
+        let deck = head(
+            "end_cycle = 1000\nend_time = 1",
+            &format!(
+                "[[part]]\nname = \"plate\"\nmaterial = \"CU_OFHC\"\n{shape}\n{held}\
+                 [[initial_stress]]\nstress = [60e6, -30e6, 0, 20e6, 0, 0]\nplastic_strain = 0.1\n"
+            ),
+        );
+        let solved = run_with_states(model(&deck));
+        figures.add(&format!("plate of {kind} under stress: change of it in 1000 cycles"), change(&solved));
+    }
+}
+
+/// A strip with a stress that is linear through its thickness springs back to an arc.
+pub(super) fn a_bent_strip_springs_back(figures: &mut Figures) {
+    for (points, in_plane, kind) in
+        [(2, 1, "2 points"), (5, 1, "5 points"), (2, 4, "2 points in each of four")]
+    {
+        let deck = head(
+            "end_time = 0.02",
+            &format!(
+                "[relaxation]\nrate = 2000\n[[part]]\nname = \"strip\"\nmaterial = {ELASTIC}\n\
+                 shell = {{ thickness = 2e-3, points = {points}, in_plane = {in_plane} }}\n\
+                 plate = {{ origin = [0, 0, 0], side_i = [0.1, 0, 0], side_j = [0, 0.01, 0], cells = [20, 2] }}\n\
+                 [[boundary]]\ntype = \"fixed\"\nface = \"i-min\"\nrotations = \"xyz\"\n\
+                 [[initial_stress]]\nlayers = [{{ height = -1, stress = [-20e6, 0, 0, 0, 0, 0] }}, \
+                 {{ height = 1, stress = [20e6, 0, 0, 0, 0, 0] }}]\n"
+            ),
+        );
+        let solved = run(model(&deck));
+        let tip = solved.state.x.iter().map(|x| x[2]).fold(f64::MIN, f64::max);
+        figures.add(&format!("springback of a strip, {kind}: deflection"), tip);
+    }
+}
+
+/// A cube that was hardened before is pulled until it flows.
+fn pulled(initial: &str) -> Model {
+    model(&head(
+        "end_time = 1e-3",
+        &format!(
+            "[[part]]\nname = \"cube\"\nmaterial = {{ density = 8000, eos = {{ type = \"linear\", bulk = \
+             166.66666666666667e9 }}, strength = {{ type = \"von-mises\", shear = 76.92307692307692e9, yield_stress = \
+             300e6, hardening = 1e9 }} }}\nbox = {{ origin = [0, 0, 0], size = [0.01, 0.01, 0.01], cells = [1, 1, 1] }}\n\
+             [[boundary]]\ntype = \"fixed\"\nface = \"i-min\"\naxes = \"x\"\n\
+             [[boundary]]\ntype = \"velocity\"\nface = \"i-max\"\nvelocity = {{ x = 0.1 }}\n{initial}"
+        ),
+    ))
+}
+
+pub(super) fn plastic_strain_at_the_start_has_hardened(figures: &mut Figures) {
+    let solved = run(pulled("[[initial_stress]]\nplastic_strain = 0.1\n"));
+    let of = |k: usize| solved.state.elements[k][0];
+    figures.add("hardened cube: stress at its end", of(field::SXX) - of(field::PRESSURE));
+    figures.add("hardened cube: plastic strain at its end", of(field::PLASTIC_STRAIN));
+}
