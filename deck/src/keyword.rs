@@ -15,6 +15,7 @@ mod contact;
 mod control;
 mod damping;
 mod define;
+mod discrete;
 mod erosion;
 mod explosive;
 mod fields;

@@ -66,7 +66,7 @@ pub struct PartForecast {
     pub speed_m_s: f64,
     /// The thinnest way through an element.
     pub least_cell_m: f64,
-    /// The step that its elements allow; none of rigid bodies and trusses, which allow any.
+    /// The step that its elements allow; none of rigid bodies, which allow any, and of trusses, springs and beams.
     pub step_s: Option<f64>,
 }
 
@@ -185,7 +185,7 @@ fn measure(model: &Model, index: usize) -> Measured {
     let n = part.n_elements().max(1) as f64;
     this.cell = match &part.topology {
         Topology::Shells { .. } => (area / n).sqrt(),
-        Topology::Trusses { .. } | Topology::Beams { .. } => this.least_cell,
+        Topology::Trusses { .. } | Topology::Springs { .. } | Topology::Beams { .. } => this.least_cell,
         Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => {
             libm::cbrt(volume / n)
         }
@@ -263,7 +263,7 @@ impl Sums {
                 Topology::Shells { section, .. } => {
                     v / (part.thickness_of(e).unwrap_or(section.thickness) * longest)
                 }
-                Topology::Trusses { .. } | Topology::Beams { .. } => longest,
+                Topology::Trusses { .. } | Topology::Springs { .. } | Topology::Beams { .. } => longest,
                 // A third of the least height: a node stands half-way up.
                 Topology::Tetrahedra { .. } => v / largest_side(&x),
                 Topology::Explicit { .. } => {

@@ -9,6 +9,7 @@ mod contact;
 mod entry;
 mod hourglass;
 pub(crate) mod joint;
+mod kind;
 pub(crate) mod moving;
 mod output;
 mod part;

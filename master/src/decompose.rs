@@ -130,6 +130,7 @@ impl Living {
                 | Topology::Tetrahedra { .. }
                 | Topology::Shells { .. }
                 | Topology::Trusses { .. }
+                | Topology::Springs { .. }
                 | Topology::Beams { .. } => Part::List(alive.to_vec()),
                 Topology::Structured { cells } => {
                     let [ni, nj, nk] = cells.map(|n| n as usize);
@@ -231,6 +232,7 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec
             | Topology::Tetrahedra { .. }
             | Topology::Shells { .. }
             | Topology::Trusses { .. }
+            | Topology::Springs { .. }
             | Topology::Beams { .. } => {
                 let n_elements = mesh_part.n_elements();
                 let centres: Vec<[f64; 3]> = (0..n_elements)

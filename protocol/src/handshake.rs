@@ -29,7 +29,7 @@ use std::fmt;
 /// 13: workers that divide their threads.
 /// 14: votes foresee strikes on rigid walls, setups have parts that are rigid for a time.
 /// 15: relaxation has a rate.
-/// 16: shells of four points and membranes, thicknesses by shell, and pressures that move.
+/// 16: shells of four points and membranes, thicknesses by shell, springs, cables, and pressures that move.
 pub const VERSION: u16 = 16;
 
 /// Most characters of a host's name.

@@ -21,6 +21,7 @@ mod particles;
 mod sections;
 mod seeds;
 mod spans;
+mod springs;
 mod starts;
 mod strikes;
 mod sums;

@@ -96,7 +96,7 @@ impl Block {
                 across.retain(|_| *kept.next().expect("one for each"));
                 bars.iter_mut().for_each(|ends| *ends = ends.each_ref().map(renumbered));
             }
-            Topology::Trusses { bars, .. } => {
+            Topology::Trusses { bars, .. } | Topology::Springs { bars, .. } => {
                 bars.retain(|_| stays());
                 bars.iter_mut().for_each(|ends| *ends = ends.each_ref().map(renumbered));
             }
@@ -120,7 +120,9 @@ impl Block {
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra.len(),
             Topology::Tetrahedra { tetrahedra } => tetrahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
-            Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => bars.len(),
+            Topology::Trusses { bars, .. }
+            | Topology::Springs { bars, .. }
+            | Topology::Beams { bars, .. } => bars.len(),
         }
     }
 
@@ -137,9 +139,9 @@ impl Block {
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra[e],
             Topology::Tetrahedra { tetrahedra } => tet10::collapsed(&tetrahedra[e]),
             Topology::Shells { quads, .. } => std::array::from_fn(|c| quads[e][c % 4]),
-            Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => {
-                std::array::from_fn(|c| bars[e][c % 2])
-            }
+            Topology::Trusses { bars, .. }
+            | Topology::Springs { bars, .. }
+            | Topology::Beams { bars, .. } => std::array::from_fn(|c| bars[e][c % 2]),
         }
     }
 

@@ -1,4 +1,4 @@
-//! `*SECTION_BEAM` of trusses and beams.
+//! `*SECTION_BEAM` of trusses, cables and beams.
 
 use mechanics::element::beam2::{BeamSection, Shape, USUAL_POINTS};
 
@@ -23,11 +23,12 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
             form @ (0 | 1 | 4 | 5 | 9) => of_shape(&f, &g, (form, context), card),
             2 => of_moments(&g).map(Section::Beam),
             3 => truss(&g),
+            6 => cable(&g),
             _ => {
                 f.fault(
                     1,
-                    "ELFORM 1, 2, 3, 4, 5 or 9",
-                    "take the beam of Hughes and Liu or of Belytschko, the spot weld, or the truss",
+                    "ELFORM 1, 2, 3, 4, 5, 6 or 9",
+                    "take the beam of Hughes and Liu or of Belytschko, the spot weld, the truss, or the cable",
                 );
                 None
             }
@@ -35,6 +36,7 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
         // One that could not be read is known, so that its parts say nothing of it.
         let unread = || match form {
             3 => Section::Truss(1.0),
+            6 => Section::Cable(1.0),
             _ => Section::Beam(Shape::Rectangle([1.0; 2]).section(USUAL_POINTS)),
         };
         problem.sections.insert(f.id(0), (card.at, section.unwrap_or_else(unread)));
@@ -59,6 +61,25 @@ fn truss(g: &Fields<'_>) -> Option<Section> {
         }
     }
     area.map(Section::Truss)
+}
+
+/// VOL, INER, CID, CA, OFFSET, RRCON, SRCON, TRCON of a discrete beam that is a cable. INER is the inertia of rotations, which cables
+/// do not have.
+fn cable(g: &Fields<'_>) -> Option<Section> {
+    let refused = [
+        (0, "VOL 0: a cable has the mass RO times CA times its length"),
+        (2, "CID 0: a cable pulls along the line between its nodes"),
+        (4, "OFFSET 0: a cable is as long without stress as in the mesh, or shorter by F0"),
+        (5, "RRCON 0: a cable has no rotations"),
+        (6, "SRCON 0: a cable has no rotations"),
+        (7, "TRCON 0: a cable has no rotations"),
+    ];
+    for (i, expected) in refused {
+        if g.real(i, 0.0) != 0.0 {
+            g.fault(i, expected, "leave it blank");
+        }
+    }
+    g.positive(3, "an area CA").map(Section::Cable)
 }
 
 /// A, ISS, ITT, J, SA.

@@ -87,6 +87,10 @@ pub(super) enum Law {
         speed: f64,
         pressure: f64,
     },
+    /// A cable that pulls with this force at the start.
+    Cable {
+        tension: f64,
+    },
     /// Axes along which and about which the part does not move.
     Rigid {
         held: [[bool; 3]; 2],
@@ -116,7 +120,7 @@ pub(super) enum EosCard {
 }
 
 /// The name of a material by its number.
-const NUMBERS: [(&str, &str); 26] = [
+const NUMBERS: [(&str, &str); 27] = [
     ("MAT_001", "MAT_ELASTIC"),
     ("MAT_002", "MAT_ORTHOTROPIC_ELASTIC"),
     ("MAT_003", "MAT_PLASTIC_KINEMATIC"),
@@ -135,6 +139,7 @@ const NUMBERS: [(&str, &str); 26] = [
     ("MAT_057", "MAT_LOW_DENSITY_FOAM"),
     ("MAT_063", "MAT_CRUSHABLE_FOAM"),
     ("MAT_065", "MAT_MODIFIED_ZERILLI_ARMSTRONG"),
+    ("MAT_071", "MAT_CABLE_DISCRETE_BEAM"),
     ("MAT_077_O", "MAT_OGDEN_RUBBER"),
     ("MAT_077", "MAT_OGDEN_RUBBER"),
     ("MAT_098", "MAT_SIMPLIFIED_JOHNSON_COOK"),
@@ -265,6 +270,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
             }
             (None, law)
         }
+        "MAT_CABLE_DISCRETE_BEAM" => metal::cable(&f[0]),
         "MAT_SPOTWELD" => {
             let elastic = moduli(2);
             (elastic, metal::spot_weld(&f, elastic, &mut limits))

@@ -44,8 +44,10 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> (MeshFile, Vec<Vec<Place>>) {
         thicknesses.insert(shell.id, shell.thickness(0.0));
     }
     let beams = problem.beams.iter().map(|beam| (2, beam.id, beam.part, beam.at, &beam.nodes[..]));
+    let discretes = &problem.discretes;
+    let discretes = discretes.iter().map(|spring| (2, spring.id, spring.part, spring.at, &spring.nodes[..]));
     let mut seen: [BTreeMap<u32, Place>; 3] = Default::default();
-    for (kind, id, part, at, nodes) in solids.chain(shells).chain(beams) {
+    for (kind, id, part, at, nodes) in solids.chain(shells).chain(beams).chain(discretes) {
         if let Some(first) = seen[kind].insert(id, at) {
             let expected = format!("a number other than {id}, which {} has", log.line(first, at));
             log.fault(at, format!("element {id}"), expected, "renumber one");
@@ -73,7 +75,7 @@ fn mesh_of(problem: &Problem, log: &Log<'_>) -> (MeshFile, Vec<Vec<Place>>) {
         }
     }
     if bodies.is_empty() && log.count() == 0 {
-        let expected = "*ELEMENT_SOLID, *ELEMENT_SHELL or *ELEMENT_BEAM";
+        let expected = "*ELEMENT_SOLID, *ELEMENT_SHELL, *ELEMENT_BEAM or *ELEMENT_DISCRETE";
         log.fault(Place::card(0, 1), "a mesh without elements", expected, "add the elements");
     }
     // A heading names its part where it tells it from others.

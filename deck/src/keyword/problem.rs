@@ -12,6 +12,7 @@ use super::{
     condition::Conditions,
     contact::ContactCard,
     control::ControlCards,
+    discrete::{Discrete, SpringCard},
     erosion::Limits,
     explosive::DetonationCard,
     joint::JointCard,
@@ -105,7 +106,11 @@ pub(super) enum Section {
     Shell(ShellSection),
     /// Of a truss: its area.
     Truss(f64),
+    /// Of a cable: its area.
+    Cable(f64),
     Beam(BeamSection),
+    /// Of springs and dampers.
+    Discrete,
 }
 
 /// `*SECTION_SHELL`.
@@ -159,9 +164,12 @@ pub(super) struct Problem {
     pub(super) solids: Vec<Solid>,
     pub(super) shells: Vec<Shell>,
     pub(super) beams: Vec<Beam>,
+    pub(super) discretes: Vec<Discrete>,
     pub(super) parts: BTreeMap<u32, PartCard>,
     pub(super) sections: BTreeMap<u32, (Place, Section)>,
     pub(super) materials: BTreeMap<u32, MaterialCard>,
+    /// Those of springs and dampers.
+    pub(super) springs: BTreeMap<u32, SpringCard>,
     pub(super) equations: BTreeMap<u32, EosCard>,
     /// Materials and equations of state that could not be read, which was reported.
     pub(super) refused_materials: BTreeSet<u32>,
@@ -209,7 +217,8 @@ impl Problem {
         let solids = solids.flat_map(|e| e.nodes.into_iter().chain(e.edges.into_iter().flatten()));
         let shells = self.shells.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
         let beams = self.beams.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
-        let mut nodes: Vec<u32> = solids.chain(shells).chain(beams).collect();
+        let discretes = self.discretes.iter().filter(|e| e.part == part).flat_map(|e| e.nodes);
+        let mut nodes: Vec<u32> = solids.chain(shells).chain(beams).chain(discretes).collect();
         nodes.sort_unstable();
         nodes.dedup();
         nodes

@@ -9,7 +9,7 @@ use super::{
     cards::{Block, Lines},
     condition::Conditions,
     contact::ContactCard,
-    damping, define, erosion, explosive,
+    damping, define, discrete, erosion, explosive,
     fields::{Context, TENS},
     inertia, joint, material, mesh, moving,
     problem::{Problem, UnitsCard},
@@ -21,10 +21,11 @@ use crate::{log::Log, place::Place};
 
 /// Keywords of several sections, each with a heading of its own where the keyword ends in `_TITLE`; and the cards of a
 /// section.
-const HEADED: [(&str, usize); 8] = [
+const HEADED: [(&str, usize); 9] = [
     ("SECTION_SOLID", 1),
     ("SECTION_SHELL", 2),
     ("SECTION_BEAM", 2),
+    ("SECTION_DISCRETE", 2),
     ("HOURGLASS", 1),
     ("DEFINE_BOX", 1),
     ("DEFINE_VECTOR", 1),
@@ -66,7 +67,7 @@ pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
 
 /// Whether a keyword belongs to a mesh alone.
 fn is_of_mesh(word: &str) -> bool {
-    const WORDS: [&str; 10] = [
+    const WORDS: [&str; 11] = [
         "KEYWORD",
         "KEYWORD_ID",
         "COMMENT",
@@ -76,6 +77,7 @@ fn is_of_mesh(word: &str) -> bool {
         "ELEMENT_SHELL",
         "ELEMENT_SHELL_THICKNESS",
         "ELEMENT_BEAM",
+        "ELEMENT_DISCRETE",
         "PART",
     ];
     WORDS.contains(&word)
@@ -147,6 +149,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "ELEMENT_SHELL" => mesh::read_shells(problem, block, context, false),
         "ELEMENT_BEAM" => mesh::read_beams(problem, block, context, false),
         "ELEMENT_BEAM_ORIENTATION" => mesh::read_beams(problem, block, context, true),
+        "ELEMENT_DISCRETE" => discrete::read_elements(problem, block, context),
         "ELEMENT_SHELL_THICKNESS" => mesh::read_shells(problem, block, context, true),
         "PART" => property::read_parts(problem, block, context, false),
         "PART_CONTACT" => property::read_parts(problem, block, context, true),
@@ -155,6 +158,7 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "SECTION_SOLID" => property::read_solid_sections(problem, block, context),
         "SECTION_SHELL" => property::read_shell_sections(problem, block, context),
         "SECTION_BEAM" => beam::read_sections(problem, block, context),
+        "SECTION_DISCRETE" => discrete::read_sections(problem, block, context),
         "HOURGLASS" => property::read_hourglass(problem, block, context),
         "DEFINE_CURVE" => define::read_curve(problem, block, context),
         "DEFINE_VECTOR" => {}
@@ -235,12 +239,21 @@ fn read_materials(problem: &mut Problem, blocks: Vec<&mut Block<'_>>, context: &
 fn read_material(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>, id: u32) {
     let head = block.card(0);
     let f = context.fields(&head, block.width, &TENS);
-    let Some(card) = material::read(block, context) else {
-        problem.refused_materials.insert(id);
-        return;
-    };
-    if let Some(first) = problem.materials.insert(id, card) {
-        let line = context.log.line(first.at, head.at);
+    let taken = problem.materials.get(&id).map(|first| first.at);
+    let taken = taken.or(problem.springs.get(&id).map(|first| first.at));
+    if discrete::knows_material(&block.keyword) {
+        match discrete::read_material(block, context) {
+            Some(card) => drop(problem.springs.insert(id, card)),
+            None => drop(problem.refused_materials.insert(id)),
+        }
+    } else {
+        match material::read(block, context) {
+            Some(card) => drop(problem.materials.insert(id, card)),
+            None => drop(problem.refused_materials.insert(id)),
+        }
+    }
+    if let Some(first) = taken {
+        let line = context.log.line(first, head.at);
         f.fault(0, format!("a number other than {id}, which {line} has"), "renumber one");
     }
 }

@@ -4,6 +4,7 @@ mod blast;
 mod condition;
 mod contact;
 mod control;
+mod discrete;
 mod element;
 mod explosive;
 mod hourglass;

@@ -326,7 +326,7 @@ fn owned<'a>(
             | Topology::Tetrahedra { .. },
         ) => 0,
         Some(Topology::Shells { .. }) => 1,
-        Some(Topology::Trusses { .. } | Topology::Beams { .. }) => 2,
+        Some(Topology::Trusses { .. } | Topology::Springs { .. } | Topology::Beams { .. }) => 2,
     };
     let elements = &mut elements[kind];
     for (ids, places, owner, what) in [
@@ -436,6 +436,11 @@ fn velocities(assembly: &mut Assembly, materials: &[Material]) {
             continue;
         }
         let total: f64 = list.iter().map(|(_, m)| m).sum();
+        if total == 0.0 {
+            // Of springs alone: their mass is that of the deck.
+            assembly.velocity[node as usize] = first;
+            continue;
+        }
         let mut velocity = [0.0; 3];
         let mut before = 0.0;
         for (p, m) in &list {

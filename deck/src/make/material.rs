@@ -8,7 +8,7 @@ use crate::{
     log::Log,
     typed::{
         Deck,
-        part::{Choice, Part},
+        part::{Choice, Kind, Part},
     },
 };
 
@@ -34,8 +34,15 @@ impl<'d> Materials<'d> {
         Self { deck, log, list: Vec::new() }
     }
 
-    /// The index of the material of a part; none after a fault.
+    /// The index of the material of a part; none after a fault. Springs have that without mass.
     pub(super) fn resolve(&mut self, part: &Part) -> Option<u32> {
+        if let Kind::Springs(_) = part.kind {
+            if let Some(fracture) = part.fracture {
+                let expected = "elements with a material: springs have none";
+                self.log.fault_of(fracture, expected, "remove it");
+            }
+            return Some(self.index_of(Material::massless()));
+        }
         let mut material = self.chosen(part.material.as_ref()?)?;
         if let Some(fracture) = part.fracture {
             match library::fracture(&material.name) {
@@ -47,11 +54,15 @@ impl<'d> Materials<'d> {
                 ),
             }
         }
+        Some(self.index_of(material))
+    }
+
+    fn index_of(&mut self, material: Material) -> u32 {
         let index = self.list.iter().position(|m| *m == material).unwrap_or_else(|| {
             self.list.push(material);
             self.list.len() - 1
         });
-        Some(index as u32)
+        index as u32
     }
 
     fn chosen(&self, choice: &Choice) -> Option<Material> {

@@ -3,7 +3,12 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
-    element::{hex8::eight_points, hourglass::Hourglass, tet10},
+    element::{
+        hex8::eight_points,
+        hourglass::Hourglass,
+        tet10,
+        truss2::{Cable, TrussError},
+    },
     erosion::{Criteria, GEOMETRIC_STRAIN},
     failure::scatter::Scatter,
     material::{Failure, Material, Strength},
@@ -114,6 +119,11 @@ pub(super) fn make(
                 section.fibres = None;
             }
         }
+        if let Some(Topology::Trusses { cable: Some(cable), .. }) =
+            block.as_mut().map(|block| &mut block.topology)
+        {
+            tighten(cable, part, of_material, log);
+        }
         drafts.push(PartDraft {
             name,
             at,
@@ -129,6 +139,22 @@ pub(super) fn make(
         });
     }
     drafts
+}
+
+/// Gives the cables of a part the length without stress that goes with their tension.
+fn tighten(cable: &mut Cable, part: &Part, material: Option<&Material>, log: &Log<'_>) {
+    let (&Kind::Cables { area, tension }, Some(material)) = (&part.kind, material) else { return };
+    match Cable::under(tension, area, material) {
+        Ok(tight) => *cable = tight,
+        Err(TrussError::Tension { most, .. }) => log.fault(
+            part.at,
+            format!("a tension of {} in the cables of part \"{}\"", short(tension), part.name),
+            format!("at most {}, at which they yield or are a fifth longer", short(most)),
+            log.say("lower tension, or give them more area", "lower F0, or give them more CA"),
+        ),
+        // Told with the sections.
+        Err(_) => {}
+    }
 }
 
 /// Whether the solids of a part have eight points. Those of a keyword deck whose material cannot be had so have one, with a warning.
@@ -218,9 +244,9 @@ fn criteria(given: &Erosion, kind: &Kind, material: Option<&Material>, log: &Log
         Kind::Solids => {}
         Kind::Shells(_) if material.is_some_and(|m| m.strength.layers().is_some()) => check_plies(given, log),
         Kind::Shells(_) | Kind::Beams { .. } => check_layers(given, log),
-        Kind::Trusses { .. } => log.fault_of(
+        Kind::Trusses { .. } | Kind::Cables { .. } | Kind::Springs(_) => log.fault_of(
             given.origin,
-            "solids, shells or beams: trusses do not erode",
+            format!("solids, shells or beams: {} do not erode", kind.elements()),
             log.say("remove erosion", "leave the limit blank"),
         ),
     }
@@ -424,7 +450,10 @@ fn body_of(
     {
         let (expected, advice) = match other.kind() {
             "shells" => ("their thickness", "add shell = { thickness = ... } to the part"),
-            _ => ("their cross-section", "add truss = { area = ... } or beam = { ... } to the part"),
+            _ => (
+                "their cross-section or law",
+                "add truss = { area = ... }, beam, cable or spring = { ... } to the part",
+            ),
         };
         let read = format!("the {} of body \"{name}\" in part \"{}\"", other.kind(), part.name);
         log.fault(at.at, read, expected, advice);

@@ -35,6 +35,7 @@ pub(super) fn check(
     log: &Log<'_>,
 ) {
     sections(parts, assembly, materials, log);
+    springs(parts, assembly, log);
     // Elements that a join folds together were reported with the join.
     let volumes_fit = !assembly.collapsed && volumes(parts, assembly, log);
     // Inside and outside mean nothing for inverted elements.
@@ -135,6 +136,7 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
                 }
                 ("beams", beam2::check(section, material).map_err(|e| e.to_string()))
             }
+            Topology::Springs { .. } => continue,
             Topology::Trusses { area, .. } => {
                 ("trusses", truss2::check(*area, material).map_err(|e| e.to_string()))
             }
@@ -155,6 +157,45 @@ fn sections(parts: &[PartDraft], assembly: &Assembly, materials: &[Material], lo
                 );
             }
             Ok(()) => {}
+        }
+    }
+}
+
+/// Reports nodes of springs that have no mass.
+fn springs(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) {
+    let mesh = &assembly.mesh;
+    let is_spring = |part: &mesh::Part| matches!(part.topology, Topology::Springs { .. });
+    if !mesh.parts.iter().any(is_spring) {
+        return;
+    }
+    let mut has_mass = vec![false; mesh.n_nodes()];
+    let of_elements = mesh.parts.iter().filter(|part| !is_spring(part)).flat_map(|part| &part.nodes);
+    for &node in of_elements.chain(mesh.lumped.iter().map(|(node, _)| node)) {
+        has_mass[node as usize] = true;
+    }
+    for (part, draft) in mesh.parts.iter().zip(parts).filter(|(part, _)| is_spring(part)) {
+        let bare: Vec<usize> = (0..part.nodes.len()).filter(|&n| !has_mass[part.nodes[n] as usize]).collect();
+        for &n in bare.iter().take(MAX_NAMED) {
+            log.fault(
+                draft.numbers.as_ref().map_or(draft.at, |own| own.node_places.of(n)),
+                format!(
+                    "node {} of part \"{}\", of springs alone, without mass",
+                    mesh.node_ids[part.nodes[n] as usize], part.name
+                ),
+                "a mass, also of a node that is held: springs have none",
+                log.say(
+                    "give it one by [[mass]], or join it to a body",
+                    "give it one by *ELEMENT_MASS, or take a node of a body",
+                ),
+            );
+        }
+        if bare.len() > MAX_NAMED {
+            log.fault(
+                draft.at,
+                format!("{} more such nodes in part \"{}\"", bare.len() - MAX_NAMED, part.name),
+                "masses",
+                "mend those named first",
+            );
         }
     }
 }
@@ -183,6 +224,7 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
             return false;
         }
         let volumes = &assembly.volumes[offsets[p]..offsets[p + 1]];
+        let is_spring = matches!(part.topology, Topology::Springs { .. });
         let bad: Vec<usize> = (0..volumes.len())
             .into_par_iter()
             .filter(|&e| {
@@ -192,7 +234,8 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
                     dot(along, along)
                 };
                 let edge = EDGES.iter().map(square).fold(0.0, f64::max).sqrt();
-                !(volumes[e] > FLAT * edge * edge * edge && volumes[e].is_finite())
+                let least = if is_spring { 0.0 } else { FLAT * edge * edge * edge };
+                !(volumes[e] > least && volumes[e].is_finite())
             })
             .collect();
         fit &= bad.is_empty();
@@ -201,22 +244,24 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
         {
             fit &= folded(assembly, p, offsets[p], own, log);
         }
+        let size = if is_spring { "length" } else { "volume" };
         for &e in bad.iter().take(MAX_NAMED) {
             let at = draft.numbers.as_ref().map_or(draft.at, |own| own.element_places.of(e));
             let advice = match part.topology {
                 Topology::Shells { .. } => "order the corners around the element",
+                Topology::Springs { .. } => "give it two nodes at different places",
                 Topology::Explicit { .. } if draft.numbers.is_some() => CORNER_ORDER,
                 _ => "use a size that the numbers can hold, or a smaller join tolerance",
             };
             log.fault(
                 at,
                 format!(
-                    "element {} of part \"{}\" with volume {}",
+                    "element {} of part \"{}\" with {size} {}",
                     part.element_ids[e],
                     part.name,
                     short(volumes[e])
                 ),
-                "a volume above 0",
+                format!("a {size} above 0"),
                 advice,
             );
         }
@@ -224,7 +269,7 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
             log.fault(
                 draft.at,
                 format!("{} more such elements in part \"{}\"", bad.len() - MAX_NAMED, part.name),
-                "volumes above 0",
+                format!("{size}s above 0"),
                 "mend those named first",
             );
         }

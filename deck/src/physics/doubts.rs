@@ -77,6 +77,9 @@ fn values(model: &Model, measured: &[Measured], units: &Units, doubts: &mut Vec<
     let name = units.name;
     for (p, (part, of)) in model.mesh.parts.iter().zip(measured).enumerate() {
         let material = &model.setup.materials[part.material as usize];
+        if material.is_massless() {
+            continue;
+        }
         let is_rigid = model.setup.bodies.iter().any(|body| body.parts.contains(&(p as u32)));
         let density = material.density * mass / (length * length * length);
         let known = if material.is_gas() { GAS_DENSITIES } else { DENSITIES };

@@ -8,9 +8,10 @@ use mechanics::{
 };
 
 use super::{
-    beam,
     entry::{face_names, text},
-    hourglass, row, shape, shell,
+    hourglass,
+    kind::{self, Word},
+    row, shape,
 };
 use crate::{
     blocks::Block,
@@ -56,26 +57,10 @@ pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
         let fracture = table.get("fracture").filter(|v| v.boolean() == Some(true)).map(|v| v.origin());
         let axes = table.get("axes").and_then(|v| read_axes(v, (n, &name)));
         let scatter = table.get("scatter").and_then(|v| read_scatter(v, (n, &name)));
-        let material = table
-            .require("material", "a material by name or as an inline table")
-            .and_then(|v| read_choice(v, &name));
+        let material = read_material(&table, &name);
         let velocity = table.get("velocity").and_then(|v| v.vector()).unwrap_or_default();
         let erosion = table.get("erosion").and_then(|v| read_erosion(v, &name));
-        let (shell, truss, beam) = (table.get("shell"), table.get("truss"), table.get("beam"));
-        let kind = match (shell, truss, beam) {
-            (None, None, None) => Some(Kind::Solids),
-            (Some(value), None, None) => shell::read(value, &name).map(Kind::Shells),
-            (None, Some(value), None) => read_truss(value, &name),
-            (None, None, Some(value)) => beam::read(value, &name),
-            (_, Some(value), _) | (_, _, Some(value)) => {
-                let advice = "remove the others; a part has elements of one kind";
-                value.fault("one of shell, truss and beam", advice);
-                None
-            }
-        };
-        let given = shell.map(|value| (Word::Shell, value));
-        let given =
-            given.or(truss.map(|value| (Word::Truss, value))).or(beam.map(|value| (Word::Beam, value)));
+        let (given, kind) = kind::read(&table, &name);
         let eight_points = table.get("points").and_then(read_points);
         let hourglass = table
             .get("hourglass")
@@ -122,6 +107,18 @@ fn read_points(value: Value<'_>) -> Option<Origin> {
     }
 }
 
+/// The material of a part, which springs do not have.
+fn read_material(table: &Table<'_>, part: &str) -> Option<Choice> {
+    if table.has("spring") {
+        if let Some(value) = table.get("material") {
+            value.fault("no material beside a spring, which has none", "remove it");
+        }
+        return None;
+    }
+    let value = table.require("material", "a material by name or as an inline table")?;
+    read_choice(value, part)
+}
+
 /// A material that a part names or writes inline.
 fn read_choice(value: Value<'_>, part: &str) -> Option<Choice> {
     if !value.is_table() {
@@ -145,22 +142,6 @@ fn read_erosion(value: Value<'_>, part: &str) -> Option<Erosion> {
     let failure = table.get("failure").and_then(|v| v.boolean().map(|on| v.placed(on)));
     table.finish();
     Some(Erosion { origin: value.origin(), limits, failure })
-}
-
-/// The key that says the kind of elements.
-#[derive(Clone, Copy)]
-enum Word {
-    Shell,
-    Truss,
-    Beam,
-}
-
-/// `truss = { area }`.
-fn read_truss(value: Value<'_>, name: &str) -> Option<Kind> {
-    let table = value.table(format!("truss of \"{name}\""))?;
-    let area = table.number("area", Range::Positive);
-    table.finish();
-    area.map(|area| Kind::Trusses { area })
 }
 
 /// The axes of the material by element: `"element"`, or a table with what they follow and the angle that turns them.
@@ -240,11 +221,9 @@ fn read_mesh(
         Some((Word::Shell, shell)) if !of_shells && kind != "mesh" => {
             shell.fault("no shell: solids fill this block", "remove it, or take plate, prism or mesh");
         }
-        Some((Word::Truss | Word::Beam, bar)) if kind != "mesh" => {
-            bar.fault(
-                "no truss or beam: another kind of element fills this block",
-                "remove it, or take mesh",
-            );
+        Some((word, bar)) if word != Word::Shell && kind != "mesh" => {
+            let expected = format!("no {}: another kind of element fills this block", word.key());
+            bar.fault(&expected, "remove it, or take mesh");
         }
         _ => {}
     }
@@ -363,7 +342,9 @@ fn read_explicit(table: Table<'_>, kind: Kind) -> Option<Explicit> {
                 Kind::Shells(_) => {
                     ("four different nodes", "list each corner once; triangles come in mesh files")
                 }
-                Kind::Trusses { .. } | Kind::Beams { .. } => ("two different nodes", "list both ends"),
+                Kind::Trusses { .. } | Kind::Cables { .. } | Kind::Springs(_) | Kind::Beams { .. } => {
+                    ("two different nodes", "list both ends")
+                }
             };
             element.fault(expected, advice);
         }

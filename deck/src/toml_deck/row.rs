@@ -18,7 +18,9 @@ pub(super) fn read(element: &Value<'_>, kind: &Kind) -> Option<(Vec<u64>, Option
             return Some((numbers?, Some(thickness?)));
         }
         Kind::Shells(_) => element.integers::<5>("[id, n1, n2, n3, n4]", 1, max)?.to_vec(),
-        Kind::Trusses { .. } | Kind::Beams { .. } => element.integers::<3>("[id, n1, n2]", 1, max)?.to_vec(),
+        Kind::Trusses { .. } | Kind::Cables { .. } | Kind::Springs(_) | Kind::Beams { .. } => {
+            element.integers::<3>("[id, n1, n2]", 1, max)?.to_vec()
+        }
     };
     Some((numbers, None))
 }

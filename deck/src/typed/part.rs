@@ -1,7 +1,7 @@
 //! Materials of a deck, and its parts.
 
 use mechanics::{
-    element::{beam2::BeamSection, hourglass::Hourglass},
+    element::{beam2::BeamSection, hourglass::Hourglass, spring2::Spring, truss2::Cable},
     erosion::Criteria,
     failure::scatter::Scatter,
     material::Material,
@@ -41,6 +41,15 @@ pub(crate) enum Kind {
         /// Area of the cross-section.
         area: f64,
     },
+    /// Trusses that do not push.
+    Cables {
+        /// Area of the cross-section without stress.
+        area: f64,
+        /// Force with which they pull at the start.
+        tension: f64,
+    },
+    /// Discrete springs and dampers, which have no material.
+    Springs(Spring),
     Beams {
         section: BeamSection,
         /// A direction whose part across a beam is its axis `e2`, of elements without one of their own; of no length where any serves.
@@ -55,6 +64,8 @@ impl Kind {
             Self::Solids => "solids",
             Self::Shells(_) => "shells",
             Self::Trusses { .. } => "trusses",
+            Self::Cables { .. } => "cables",
+            Self::Springs(_) => "springs",
             Self::Beams { .. } => "beams",
         }
     }
@@ -62,7 +73,7 @@ impl Kind {
     /// The word of bodies of mesh files with such elements ([`Body::kind`](crate::mesh_file::Body::kind)).
     pub(crate) fn of_body(&self) -> &'static str {
         match self {
-            Self::Beams { .. } => "trusses",
+            Self::Cables { .. } | Self::Springs(_) | Self::Beams { .. } => "trusses",
             _ => self.elements(),
         }
     }
@@ -72,7 +83,7 @@ impl Kind {
         match self {
             Self::Solids => 8,
             Self::Shells(_) => 4,
-            Self::Trusses { .. } | Self::Beams { .. } => 2,
+            Self::Trusses { .. } | Self::Cables { .. } | Self::Springs(_) | Self::Beams { .. } => 2,
         }
     }
 
@@ -83,7 +94,9 @@ impl Kind {
                 (&[4, 5, 6, 8], "eight, or six, five or four of a wedge, a pyramid or a tetrahedron")
             }
             Self::Shells(_) => (&[3, 4], "four, or three of a triangle"),
-            Self::Trusses { .. } | Self::Beams { .. } => (&[2], "two"),
+            Self::Trusses { .. } | Self::Cables { .. } | Self::Springs(_) | Self::Beams { .. } => {
+                (&[2], "two")
+            }
         }
     }
 
@@ -104,7 +117,13 @@ impl Kind {
                 section: section.clone(),
                 thicknesses: of_their_own(thicknesses, section.thickness),
             },
-            Self::Trusses { area } => Topology::Trusses { bars: fixed(elements), area: *area },
+            Self::Trusses { area } => Topology::Trusses { bars: fixed(elements), area: *area, cable: None },
+            // How long they are without their tension is for the material to say.
+            Self::Cables { area, .. } => {
+                let cable = Some(Cable { rest: 1.0 });
+                Topology::Trusses { bars: fixed(elements), area: *area, cable }
+            }
+            Self::Springs(spring) => Topology::Springs { bars: fixed(elements), spring: spring.clone() },
             Self::Beams { section, across } => {
                 let bars: Vec<[u32; 2]> = fixed(elements);
                 Topology::Beams { across: vec![*across; bars.len()], bars, section: *section }

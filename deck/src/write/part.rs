@@ -5,6 +5,7 @@ use mechanics::{
         beam2::{self, BeamSection},
         hourglass::Hourglass,
         shell4::{InPlane, Rule},
+        spring2::{Damper, Elastic, Line, Spring},
     },
     material::Material,
     mesh::{Axis, Guide, Plies, Ply, Section, Topology},
@@ -107,8 +108,13 @@ fn write_part(text: &mut Text, part: &Part) {
     if let Kind::Beams { section, across } = &part.kind {
         text.key("beam", beam(section, *across));
     }
-    if let Kind::Trusses { area } = part.kind {
-        text.key("truss", table(&[("area", format!("{area:?}"))]));
+    match &part.kind {
+        Kind::Trusses { area } => text.key("truss", table(&plain(&[("area", *area)]))),
+        Kind::Cables { area, tension } => {
+            text.key("cable", table(&plain(&[("area", *area), ("tension", *tension)])));
+        }
+        Kind::Springs(law) => text.key("spring", spring(law)),
+        _ => {}
     }
     if let Kind::Shells(Section { thickness, rule, thins, laminate, in_plane, is_membrane, .. }) = &part.kind
     {
@@ -178,6 +184,26 @@ fn write_part(text: &mut Text, part: &Part) {
         Some(Clamp::Edges(_)) => text.key("clamp", quoted("edges")),
         Some(Clamp::Faces(faces)) => text.key("clamp", list(faces.iter().map(|face| quoted(&face.value)))),
     }
+}
+
+/// The law of springs.
+fn spring(law: &Spring) -> String {
+    let line = |line: &Line| list(line.points.iter().map(|point| numbers(point)));
+    let mut keys: Keys = match &law.elastic {
+        Elastic::None => Vec::new(),
+        Elastic::Linear { stiffness } => plain(&[("stiffness", *stiffness)]),
+        Elastic::Plastic { stiffness, tangent, yields } => {
+            plain(&[("stiffness", *stiffness), ("tangent", *tangent), ("yield_force", *yields)])
+        }
+        Elastic::Curve(curve) => vec![("points", line(curve))],
+    };
+    match &law.damper {
+        Damper::None => {}
+        Damper::Linear { damping } => keys.extend(plain(&[("damping", *damping)])),
+        Damper::Curve(curve) => keys.push(("damper_points", line(curve))),
+    }
+    keys.extend(plain(&[("offset", law.offset)]));
+    table(&keys)
 }
 
 /// The section of beams and how they stand.
@@ -252,7 +278,7 @@ fn explicit(own: &Explicit) -> String {
                 list(words.chain(thicknesses.get(e).map(|thickness| format!("{thickness:?}"))))
             }))
         }
-        Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => {
+        Topology::Trusses { bars, .. } | Topology::Springs { bars, .. } | Topology::Beams { bars, .. } => {
             list(bars.iter().zip(numbers).map(|(ends, id)| element(id, ends)))
         }
         // No reader makes a grid of explicit elements.

@@ -15,6 +15,7 @@ mod mutations;
 mod records;
 mod rigid;
 mod spans;
+mod springs;
 mod stress;
 
 use std::{fs, path::Path};
@@ -470,8 +471,8 @@ fn what_cannot_be_honoured_is_refused_where_it_stands() {
             "a.k:25:1: read *MAT_SEATBELT; expected a material of the table",
         ),
         (
-            "*ELEMENT_DISCRETE\n1,1,1,2,3\n",
-            "a.k:22:1: read *ELEMENT_DISCRETE; expected a keyword of the table",
+            "*ELEMENT_SEATBELT\n1,1,1,2,3\n",
+            "a.k:22:1: read *ELEMENT_SEATBELT; expected a keyword of the table",
         ),
         (
             "*CONTROL_IMPLICIT_GENERAL\n1\n",

@@ -362,8 +362,8 @@ fn reading(state: &[f64], density: f64) -> impl Iterator<Item = f64> {
         state[field::PLASTIC_STRAIN],
         state[field::TEMPERATURE],
         density / state[field::RELATIVE_VOLUME],
-        // Energy is held per initial volume.
-        state[field::ENERGY] / density,
+        // Energy is held per initial volume; without mass there is none by mass.
+        if density > 0.0 { state[field::ENERGY] / density } else { 0.0 },
         state[field::DAMAGE],
     ];
     known.into_iter().chain(state[N_FIELDS..].iter().copied())

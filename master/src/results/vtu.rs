@@ -14,7 +14,7 @@ pub mod read;
 
 use deck::model::Model;
 use mechanics::{
-    element::{beam2, shell4, tet10},
+    element::{beam2, shell4, spring2, tet10},
     mesh::{Column, Form, Part, Topology},
     state::{GlobalState, PartHistory, field},
 };
@@ -32,7 +32,7 @@ pub use fields::Fields;
 /// Cell type of the eight-node hexahedron.
 const VTK_HEXAHEDRON: u8 = 12;
 
-/// Cell types of the solids with fewer nodes, of trusses and beams, of shells, and of tetrahedra of ten nodes.
+/// Cell types of the solids with fewer nodes, of trusses, springs and beams, of shells, and of tetrahedra of ten nodes.
 const VTK_TETRA: u8 = 10;
 const VTK_WEDGE: u8 = 13;
 const VTK_PYRAMID: u8 = 14;
@@ -112,7 +112,7 @@ impl Elements<'_> {
     }
 }
 
-/// Writes one state as a `.vtu` file, whole or not at all. Shells are quadrilaterals and trusses lines in it, solids of fewer nodes cells of
+/// Writes one state as a `.vtu` file, whole or not at all. Shells are quadrilaterals, and trusses, beams and springs lines in it, solids of fewer nodes cells of
 /// their form. With shells there are two
 /// more element fields: `thickness` (zero for solids) and `von_mises_max`, the greatest of their layers; other stresses of
 /// shells are means through the thickness in the frame of the element.
@@ -302,8 +302,11 @@ fn data_arrays<'a>(
         Array::f64("temperature", n_elements, move |e| [temperature(e)]),
         Array::f64("damage", n_elements, move |e| [damage(e)]),
         Array::f64("density", n_elements, move |e| [elements.density(e) / relative_volume(e)]),
-        // Energy is held per initial volume.
-        Array::f64("energy", n_elements, move |e| [energy(e) / elements.density(e)]),
+        // Energy is held per initial volume; without mass there is none by mass.
+        Array::f64("energy", n_elements, move |e| {
+            let density = elements.density(e);
+            [if density > 0.0 { energy(e) / density } else { 0.0 }]
+        }),
         Array::f64("stress", n_elements, move |e| {
             let ([xx, yy, xy, yz, zx], p) = (deviator(e), pressure(e));
             [xx - p, yy - p, -(xx + yy) - p, xy, yz, zx]
@@ -340,7 +343,8 @@ fn data_arrays<'a>(
             [layers.map(largest).fold(0.0, f64::max)]
         }));
     }
-    if mesh.parts.iter().any(|part| matches!(part.topology, Topology::Beams { .. })) {
+    let has_forces = |part: &Part| matches!(part.topology, Topology::Beams { .. } | Topology::Springs { .. });
+    if mesh.parts.iter().any(has_forces) {
         let of_beam = move |e: usize| {
             let (part, local) = elements.locate(e);
             let part = &mesh.parts[part];
@@ -350,6 +354,9 @@ fn data_arrays<'a>(
             Some((length, [0, 1, 2, 3, 4, 5].map(|i| state.own[beam2::AXIAL + i][e])))
         };
         cell.push(Array::f64("beam_force", n_elements, move |e| {
+            if let Topology::Springs { .. } = mesh.parts[elements.locate(e).0].topology {
+                return [state.own[spring2::FORCE][e], 0.0, 0.0];
+            }
             of_beam(e).map_or([0.0; 3], |(length, [axial, _, ya, yb, za, zb])| {
                 [axial, -(za + zb) / length, (ya + yb) / length]
             })

@@ -264,7 +264,8 @@ impl Block {
         match self.topology {
             Topology::Structured { .. } | Topology::Explicit { .. } => true,
             Topology::EightPoint { .. } | Topology::Tetrahedra { .. } => true,
-            Topology::Shells { .. } | Topology::Trusses { .. } | Topology::Beams { .. } => false,
+            Topology::Shells { .. } | Topology::Beams { .. } => false,
+            Topology::Trusses { .. } | Topology::Springs { .. } => false,
         }
     }
 

@@ -19,6 +19,7 @@ pub(crate) mod modes;
 pub(crate) mod place;
 pub(crate) mod rotation;
 pub mod shell4;
+pub mod spring2;
 pub mod tet10;
 pub mod truss2;
 pub mod uniform;

@@ -11,7 +11,7 @@ use crate::{
     burn::lighting_time,
     constraint::{Circle, Constraint, MAX_WALLS},
     contact::{Extent, Settings},
-    element::{beam2, hex8::points, shell4, tet10},
+    element::{beam2, hex8::points, shell4, spring2, tet10},
     exact::{Quanta, Quantum},
     failure::scatter::Scatter,
     load::{Drive, SurfaceKind},
@@ -29,7 +29,7 @@ use crate::{
 /// Nodal masses are exact sums of rounded shares, so that the order of elements and the joins do not matter.
 ///
 /// # Errors
-/// Names the first element without a positive volume.
+/// Names the first element without a positive volume, and the first node of a spring without mass.
 pub fn state(
     mesh: &Mesh,
     setup: &Setup,
@@ -85,6 +85,13 @@ pub fn state(
         ] {
             state.elements[field][of_part.clone()].iter_mut().for_each(|place| write_changed(place, value));
         }
+        if let Topology::Trusses { cable: Some(cable), .. } = part.topology {
+            for (field, value) in cable.at_start(material) {
+                state.elements[field][of_part.clone()]
+                    .iter_mut()
+                    .for_each(|place| write_changed(place, value));
+            }
+        }
         for index in of_part {
             if let Topology::EightPoint { .. } = part.topology {
                 for of_point in &mut state.own[points::TEMPERATURES] {
@@ -106,6 +113,7 @@ pub fn state(
     }
     debug_assert_eq!(state.elements.len(), N_FIELDS);
     state.mass = masses(mesh, setup, &state.initial_volume);
+    spring2::start(mesh, &mut state)?;
     shells(mesh, setup, &mut state);
     Ok(state)
 }
@@ -356,6 +364,17 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     let (mut force, mut stored, mut sound, mut driven2) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
     let mut index = 0;
     for part in &mesh.parts {
+        if let Topology::Springs { spring, .. } = &part.topology {
+            for at in index..index + part.n_elements() {
+                let length = state.initial_volume[at];
+                let pull = spring.reference(length, top_speed2.sqrt());
+                force = force.max(pull);
+                stored += 1e-3 * (pull * length);
+                sound = sound.max(length * spring2::fastest(state, at));
+            }
+            index += part.n_elements();
+            continue;
+        }
         let material = &setup.materials[part.material as usize];
         let modulus = material.wave_modulus();
         sound = sound.max((modulus / material.density).sqrt());
@@ -376,6 +395,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
                     [force, area.sqrt()]
                 }
                 Topology::Trusses { area, .. } => [area * strength, 0.0],
+                Topology::Springs { .. } => [0.0; 2],
                 Topology::Beams { section, .. } => {
                     [section.area * strength, part.volume(e, &x) / section.area]
                 }

@@ -184,6 +184,22 @@ impl Eos {
 }
 
 impl Material {
+    /// That of elements without mass, which have none of a deck: springs and dampers.
+    pub fn massless() -> Self {
+        Self {
+            name: "no material".to_owned(),
+            density: 0.0,
+            eos: Eos::Linear { bulk: 0.0 },
+            strength: Strength::Hydro,
+            failure: Failure::None,
+        }
+    }
+
+    /// Whether it has no mass ([`Material::massless`]).
+    pub fn is_massless(&self) -> bool {
+        self.density == 0.0
+    }
+
     /// Whether the equation of state is that of a gas, which has no strength.
     pub fn is_gas(&self) -> bool {
         matches!(self.eos, Eos::IdealGas { .. } | Eos::Jwl { .. })
@@ -209,8 +225,11 @@ impl Material {
         self.bulk() + 4.0 / 3.0 * self.shear()
     }
 
-    /// Speed of sound of such waves (velocity).
+    /// Speed of sound of such waves (velocity); 0 without mass.
     pub fn sound_speed(&self) -> f64 {
+        if self.is_massless() {
+            return 0.0;
+        }
         (self.wave_modulus() / self.density).sqrt()
     }
 

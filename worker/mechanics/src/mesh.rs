@@ -19,7 +19,9 @@ use crate::element::{
     hex8::{self, points},
     hourglass::{Hourglass, N_FORCES},
     shell4::{self, InPlane, Rule},
+    spring2::{self, Spring},
     tet10,
+    truss2::Cable,
 };
 
 /// The whole mesh of a problem. Owned by the master; workers get pieces of it.
@@ -86,9 +88,13 @@ pub enum Topology {
     /// Two-node trusses of one cross-section: two indices into [`Part::nodes`] each.
     Trusses {
         bars: Vec<[u32; 2]>,
-        /// Initial area of the cross-section.
+        /// Area of the cross-section without stress.
         area: f64,
+        /// Of trusses that pull alone.
+        cable: Option<Cable>,
     },
+    /// Discrete springs and dampers of one law: two indices into [`Part::nodes`] each. Their material has no density.
+    Springs { bars: Vec<[u32; 2]>, spring: Spring },
     /// Composite tetrahedra: ten indices into [`Part::nodes`] each, in the order of [`tet10`].
     Tetrahedra { tetrahedra: Vec<[u32; tet10::NODES]> },
     /// Two-node beams of one section: two indices into [`Part::nodes`] each.
@@ -177,12 +183,14 @@ impl Part {
             Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra.len(),
             Topology::Tetrahedra { tetrahedra } => tetrahedra.len(),
             Topology::Shells { quads, .. } => quads.len(),
-            Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => bars.len(),
+            Topology::Trusses { bars, .. }
+            | Topology::Springs { bars, .. }
+            | Topology::Beams { bars, .. } => bars.len(),
         }
     }
 
     /// Corners of element `e` of this part as global node indices. A shell is a hexahedron without height: its four
-    /// corners twice, so that its first two faces are its lower and its upper side and the others vanish. A truss or beam has no face: each of its
+    /// corners twice, so that its first two faces are its lower and its upper side and the others vanish. A truss, spring or beam has no face: each of its
     /// two nodes stands for the four corners of an end. A tetrahedron is the hexahedron that collapses to its four corners.
     pub fn corners(&self, e: usize) -> [u32; 8] {
         match &self.topology {
@@ -194,9 +202,9 @@ impl Part {
                 tet10::collapsed(&tetrahedra[e]).map(|local| self.nodes[local as usize])
             }
             Topology::Shells { quads, .. } => twice(quads[e]).map(|local| self.nodes[local as usize]),
-            Topology::Trusses { bars, .. } | Topology::Beams { bars, .. } => {
-                spread(bars[e]).map(|local| self.nodes[local as usize])
-            }
+            Topology::Trusses { bars, .. }
+            | Topology::Springs { bars, .. }
+            | Topology::Beams { bars, .. } => spread(bars[e]).map(|local| self.nodes[local as usize]),
         }
     }
 
@@ -211,9 +219,11 @@ impl Part {
         }
     }
 
-    /// The share of the mass of element `e` that each of its [`Part::nodes_of`] carries, and zeros behind the last.
+    /// The share of the mass of element `e` that each of its [`Part::nodes_of`] carries, and zeros behind the last. Springs have neither
+    /// mass nor volume to share.
     pub fn shares(&self, e: usize) -> [f64; MAX_NODES] {
         match &self.topology {
+            Topology::Springs { .. } => [0.0; MAX_NODES],
             Topology::Tetrahedra { .. } => tet10::SHARES,
             Topology::Explicit { hexahedra } => Form::shares(&hexahedra[e]),
             _ => std::array::from_fn(|node| if node < 8 { 0.125 } else { 0.0 }),
@@ -280,7 +290,7 @@ impl Part {
             Topology::Structured { .. } | Topology::Explicit { .. } | Topology::EightPoint { .. } => 8,
             Topology::Tetrahedra { .. } => tet10::NODES,
             Topology::Shells { .. } => 4,
-            Topology::Trusses { .. } | Topology::Beams { .. } => 2,
+            Topology::Trusses { .. } | Topology::Springs { .. } | Topology::Beams { .. } => 2,
         }
     }
 
@@ -293,7 +303,7 @@ impl Part {
             }
             Topology::Tetrahedra { .. } => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15],
             Topology::Shells { .. } => &[UPPER],
-            Topology::Trusses { .. } | Topology::Beams { .. } => &[],
+            Topology::Trusses { .. } | Topology::Springs { .. } | Topology::Beams { .. } => &[],
         }
     }
 
@@ -307,11 +317,12 @@ impl Part {
             Topology::EightPoint { .. } => points::N_OWN,
             Topology::Tetrahedra { .. } => tet10::N_OWN,
             Topology::Shells { section, .. } => section.n_fields(),
+            Topology::Springs { .. } => spring2::N_OWN,
             Topology::Beams { section, .. } => section.n_fields(),
         }
     }
 
-    /// Volume of element `e` of this part with the nodes of the mesh at `x`; of a shell, area times initial thickness.
+    /// Volume of element `e` of this part with the nodes of the mesh at `x`; of a shell, area times initial thickness; of a spring, its length.
     pub fn volume_of(&self, e: usize, x: &[[f64; 3]]) -> f64 {
         match &self.topology {
             Topology::Tetrahedra { tetrahedra } => {
@@ -344,7 +355,7 @@ impl Part {
     }
 
     /// Volume of element `e` of this part with its [`Part::corners`] at `x`; of a shell, area times initial
-    /// thickness; of a tetrahedron, as if its edges were straight.
+    /// thickness; of a tetrahedron, as if its edges were straight; of a cable, that without stress; of a spring, its length.
     pub fn volume(&self, e: usize, x: &[[f64; 3]; 8]) -> f64 {
         match &self.topology {
             Topology::Structured { .. }
@@ -355,7 +366,11 @@ impl Part {
                 let thickness = self.thickness_of(e).unwrap_or(section.thickness);
                 quad_area(&[x[0], x[1], x[2], x[3]]) * thickness
             }
-            Topology::Trusses { area, .. } => distance(x[0], x[1]) * area,
+            Topology::Trusses { area, cable, .. } => {
+                let volume = distance(x[0], x[1]) * area;
+                cable.map_or(volume, |cable| volume * cable.rest)
+            }
+            Topology::Springs { .. } => distance(x[0], x[1]),
             Topology::Beams { section, .. } => distance(x[0], x[1]) * section.area,
         }
     }

@@ -48,7 +48,7 @@ pub struct Piece {
     /// What elements of this kind have beside [`Piece::fields`], one array per number: of shells six hourglass forces, thickness,
     /// internal energy, energy of hourglass control, then for each point through the thickness, from below, stress xx, yy,
     /// xy, yz, zx in the frame of the element, plastic strain, temperature (a laminate has history variables instead); of solids with elastic hourglass control its
-    /// forces, x, y, z of each mode; of beams see [`beam2`](crate::element::beam2); of other solids nothing.
+    /// forces, x, y, z of each mode; of beams see [`beam2`](crate::element::beam2), of springs [`spring2`](crate::element::spring2); of other solids nothing.
     pub own: Vec<Vec<f64>>,
     /// Hourglass control of solids.
     pub hourglass: Hourglass,
@@ -200,9 +200,13 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             let thicknesses = of_piece.collect();
             (Topology::Shells { quads, section: section.clone(), thicknesses }, nodes, list.clone())
         }
-        (Topology::Trusses { bars, area }, Region::List(list)) => {
+        (Topology::Trusses { bars, area, cable }, Region::List(list)) => {
             let (bars, nodes) = by_first_use(bars, list);
-            (Topology::Trusses { bars, area: *area }, nodes, list.clone())
+            (Topology::Trusses { bars, area: *area, cable: *cable }, nodes, list.clone())
+        }
+        (Topology::Springs { bars, spring }, Region::List(list)) => {
+            let (bars, nodes) = by_first_use(bars, list);
+            (Topology::Springs { bars, spring: spring.clone() }, nodes, list.clone())
         }
         (Topology::Beams { bars, section, across }, Region::List(list)) => {
             let (bars, nodes) = by_first_use(bars, list);

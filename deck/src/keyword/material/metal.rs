@@ -37,6 +37,20 @@ pub(super) fn spot_weld(f: &[Fields<'_>; 8], moduli: Option<(f64, f64)>, limits:
     Some(Law::Strength(Strength::VonMises { shear, yield_stress: yield_stress?, hardening, rate: None }))
 }
 
+/// `*MAT_CABLE_DISCRETE_BEAM`: Young's modulus and no lateral strain, so that the section stays as the cable is drawn.
+pub(super) fn cable(f: &Fields<'_>) -> (Option<(f64, f64)>, Option<Law>) {
+    for (i, expected) in [
+        (3, "LCID 0: cables are elastic"),
+        (5, "TMAXF0 0: F0 is there at the start, and follows the length from then on"),
+        (6, "TRAMP 0: F0 is there at the start"),
+        (7, "IREAD 0: no further card"),
+    ] {
+        refuse(f, i, expected, "leave it blank");
+    }
+    let elastic = f.positive(2, "Young's modulus").map(|young| (young, 0.0));
+    (elastic, Some(Law::Cable { tension: not_negative(f, 4) }))
+}
+
 /// Up to here SIGY of a power law is a strain, above it a stress.
 const STRAIN_OF_SIGY: f64 = 0.02;
 

@@ -6,7 +6,10 @@ use super::state::Translation;
 use crate::{
     fault::short,
     geometry::{cross, norm, sub, volume},
-    keyword::problem::{Beam, Section, Shell},
+    keyword::{
+        discrete::Discrete,
+        problem::{Beam, Section, Shell},
+    },
     mesh_file::Body,
     place::Place,
 };
@@ -99,6 +102,7 @@ pub(super) fn read(t: &mut Translation<'_>) {
     }
     let mut named = read_shells(t, &mut bodies);
     named.extend(read_beams(t, &mut bodies));
+    named.extend(read_discretes(t, &mut bodies));
     for (id, part) in &problem.parts {
         let Some(found) = bodies.remove(id) else {
             if !named.contains(id) {
@@ -115,7 +119,7 @@ pub(super) fn read(t: &mut Translation<'_>) {
         t.mesh.nodes.push((node.id, node.x));
     }
     if t.mesh.bodies.is_empty() && log.count() == 0 {
-        let expected = "*ELEMENT_SOLID, *ELEMENT_SHELL or *ELEMENT_BEAM";
+        let expected = "*ELEMENT_SOLID, *ELEMENT_SHELL, *ELEMENT_BEAM or *ELEMENT_DISCRETE";
         log.fault(Place::card(0, 1), "a deck without elements", expected, "add a mesh");
     }
 }
@@ -129,7 +133,7 @@ fn check_section(t: &mut Translation<'_>, id: u32, body: &Body) {
             let goes_with = match section {
                 Section::Solid { .. } => "solids",
                 Section::Shell(_) => "shells",
-                Section::Truss(_) | Section::Beam(_) => "trusses",
+                Section::Truss(_) | Section::Cable(_) | Section::Beam(_) | Section::Discrete => "trusses",
             };
             if !body.solids.is_empty() && !body.tetrahedra.is_empty() {
                 let read = format!("part {id} with solids of eight and of ten nodes");
@@ -254,9 +258,17 @@ fn read_beams(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTr
             log.fault(at, format!("beam {id} with node {node}"), "nodes of the deck", "add the node");
             continue;
         }
-        if !problem.parts.contains_key(&part) {
+        let Some(card) = problem.parts.get(&part) else {
             if missing.insert(part) {
                 log.fault(at, format!("beam {id} of part {part}"), "a part of the deck", "add the *PART");
+            }
+            continue;
+        };
+        let section = problem.sections.get(&card.section.value);
+        if matches!(section, Some((_, Section::Discrete))) {
+            if missing.insert(part) {
+                let read = format!("beam {id} of part {part}, whose section is of springs");
+                log.fault(at, read, "a *SECTION_BEAM", "correct SECID, or take *ELEMENT_DISCRETE");
             }
             continue;
         }
@@ -268,7 +280,6 @@ fn read_beams(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTr
             continue;
         }
         t.used.extend(nodes);
-        let section = problem.sections.get(&problem.parts[&part].section.value);
         let is_beam = matches!(section, Some((_, Section::Beam(_))));
         let third = if is_beam && beam.third != 0 { problem.position(beam.third) } else { None };
         if is_beam {
@@ -286,6 +297,56 @@ fn read_beams(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTr
             let towards = beam.across.or(third.map(|third| sub(third, a)));
             found.body.across.push(towards.unwrap_or_default());
         }
+        found.body.trusses.push((id, nodes));
+        found.places.push(at);
+    }
+    parts
+}
+
+/// Springs and dampers by part, and the parts that have any.
+fn read_discretes(t: &mut Translation<'_>, bodies: &mut BTreeMap<u32, Found>) -> BTreeSet<u32> {
+    let (problem, log) = (t.problem, t.log);
+    let mut parts = BTreeSet::new();
+    let mut seen: HashMap<u32, Place> = problem.beams.iter().map(|beam| (beam.id, beam.at)).collect();
+    let of_beams: BTreeSet<u32> = problem.beams.iter().map(|beam| beam.part).collect();
+    let (mut missing, mut mixed) = (BTreeSet::new(), BTreeSet::new());
+    for discrete in &problem.discretes {
+        let Discrete { id, part, nodes, at, .. } = *discrete;
+        parts.insert(part);
+        if let Some(first) = seen.insert(id, at) {
+            let expected = format!("a number other than {id}, which {} has", log.line(first, at));
+            log.fault(at, format!("spring {id}"), expected, "renumber one; beams and springs share numbers");
+            continue;
+        }
+        if let Some(node) = nodes.iter().find(|node| problem.position(**node).is_none()) {
+            log.fault(at, format!("spring {id} with node {node}"), "nodes of the deck", "add the node");
+            continue;
+        }
+        let Some(card) = problem.parts.get(&part) else {
+            if missing.insert(part) {
+                log.fault(at, format!("spring {id} of part {part}"), "a part of the deck", "add the *PART");
+            }
+            continue;
+        };
+        let section = problem.sections.get(&card.section.value);
+        if of_beams.contains(&part)
+            || section.is_some_and(|(_, section)| !matches!(section, Section::Discrete))
+        {
+            if mixed.insert(part) {
+                let read = format!("spring {id} of part {part}");
+                log.fault(at, read, "a part of springs alone, with a *SECTION_DISCRETE", "correct SECID");
+            }
+            continue;
+        }
+        let [a, b] = nodes.map(|node| problem.position(node).unwrap_or_default());
+        let length = norm(sub(b, a));
+        if !(length > 0.0 && length.is_finite()) {
+            let read = format!("spring {id} of length {}", short(length));
+            log.fault(at, read, "a length above 0", "give two nodes at different places");
+            continue;
+        }
+        t.used.extend(nodes);
+        let found = bodies.entry(part).or_insert_with(|| Found::of(part));
         found.body.trusses.push((id, nodes));
         found.places.push(at);
     }

@@ -34,15 +34,26 @@ pub(super) fn write(t: &mut Translation<'_>) {
     let mut done = BTreeSet::new();
     for id in t.names.keys() {
         let part = &problem.parts[id];
+        let section = problem.sections.get(&part.section.value);
+        if matches!(section, Some((_, Section::Discrete))) {
+            continue;
+        }
         if !done.insert((part.material.value, part.eos.value)) {
             continue;
         }
         let Some(card) = problem.materials.get(&part.material.value) else {
-            if !problem.refused_materials.contains(&part.material.value) {
+            if problem.springs.contains_key(&part.material.value) {
+                let expected = "a material of elements with volume: this one is of springs";
+                log.fault_of(part.material.origin, expected, "give the part a *SECTION_DISCRETE");
+            } else if !problem.refused_materials.contains(&part.material.value) {
                 log.fault_of(part.material.origin, "a material of the deck", "add the *MAT");
             }
             continue;
         };
+        if matches!(card.law, Law::Cable { .. }) && !matches!(section, Some((_, Section::Cable(_)))) {
+            let expected = "a *SECTION_BEAM of ELFORM 6: the material is of cables";
+            log.fault_of(part.material.origin, expected, "correct SECID, or take *MAT_ELASTIC");
+        }
         let name = material_name(part.material.value, part.eos.value);
         let material = make(t, card, part, name.clone());
         t.deck.materials.push(Own { name, named: None, material });
@@ -266,7 +277,7 @@ fn strength_of(t: &Translation<'_>, material: &MaterialCard) -> Option<Strength>
             }
             strength
         }
-        Law::Elastic | Law::Rigid { .. } => Strength::Elastic { shear: shear() },
+        Law::Elastic | Law::Cable { .. } | Law::Rigid { .. } => Strength::Elastic { shear: shear() },
         Law::Null { .. } | Law::Explosive { .. } => Strength::Hydro,
         Law::Bilinear { yield_stress, tangent, rate } => {
             if !(0.0 <= tangent.value && tangent.value < young) {

@@ -7,7 +7,7 @@ use mechanics::{
     mesh::{self, Axis, Guide, Laminate, Plies, Ply, SolidAxes},
 };
 
-use super::{material::material_name, rigid, state::Translation};
+use super::{discrete, material::material_name, rigid, state::Translation};
 use crate::{
     geometry::{cross, sub},
     keyword::{
@@ -94,6 +94,14 @@ pub(super) fn write(t: &mut Translation<'_>) {
             (None, Some((_, Section::Truss(area)))) => {
                 Kind::Trusses { area: t.number(at, "an area of", *area) }
             }
+            (None, Some((_, Section::Cable(area)))) => {
+                let area = t.number(at, "an area of", *area);
+                Kind::Cables { area, tension: tension_of(t, part).unwrap_or_default() }
+            }
+            (None, Some((_, Section::Discrete))) => {
+                // One that could not be made is told, and stands for it.
+                Kind::Springs(discrete::law(t, id, part).unwrap_or_else(|| discrete::linear(1.0)))
+            }
             (None, Some((_, Section::Beam(section)))) => Kind::Beams { section: *section, across: [0.0; 3] },
             _ => Kind::Solids,
         };
@@ -143,6 +151,18 @@ pub(super) fn write(t: &mut Translation<'_>) {
     // Nodes of several parts get theirs from the mesh wherever one part would give them another.
     t.mesh.velocities = apart.iter().map(|node| (*node, of(node))).collect();
     t.mesh.spins = turning.iter().map(|node| (*node, spin[node])).collect();
+}
+
+/// The force of a cable at the start; none after a fault.
+fn tension_of(t: &Translation<'_>, part: &PartCard) -> Option<f64> {
+    match &t.problem.materials.get(&part.material.value)?.law {
+        Law::Cable { tension } => Some(*tension),
+        _ => {
+            let expected = "*MAT_CABLE_DISCRETE_BEAM: discrete beams are cables here";
+            t.log.fault_of(part.material.origin, expected, "take it, or another ELFORM");
+            None
+        }
+    }
 }
 
 /// How shells of a composite are laid up; none where neither the material nor the section says anything of it.

@@ -8,9 +8,9 @@ fn beams_of_elform_3_are_trusses_with_the_area_of_their_section() {
     let model = good(more);
     let rope = &model.mesh.parts[1];
     assert_eq!((rope.name.as_str(), rope.element_ids.as_slice(), rope.nodes.len()), ("rope", &[7][..], 2));
-    assert_eq!(rope.topology, Topology::Trusses { bars: vec![[0, 1]], area: 4.5 });
-    let faults = read(&cube(&more.replace("2,3\n4.5", "2,6\n4.5"))).expect_err("a discrete beam");
-    assert!(lines(&faults).contains("expected ELFORM 1, 2, 3, 4, 5 or 9"), "{}", lines(&faults));
+    assert_eq!(rope.topology, Topology::Trusses { bars: vec![[0, 1]], area: 4.5, cable: None });
+    let faults = read(&cube(&more.replace("2,3\n4.5", "2,7\n4.5"))).expect_err("a beam of another kind");
+    assert!(lines(&faults).contains("expected ELFORM 1, 2, 3, 4, 5, 6 or 9"), "{}", lines(&faults));
     let faults = read(&cube(&more.replace("2,2,1", "2,1,1"))).expect_err("a section of solids");
     assert!(lines(&faults).contains("*SECTION_BEAM"), "{}", lines(&faults));
 }

@@ -5,6 +5,7 @@ use super::{
     group::Group,
     hex8::{eight_points::EightPoints, group::Solids},
     shell4::Core,
+    spring2::group::Springs,
     tet10::group::Tetrahedra,
     truss2::Trusses,
     uniform::group::Uniform,
@@ -41,10 +42,14 @@ pub(crate) fn of(piece: &mut Piece, materials: &[Material]) -> (Box<dyn Group>, 
             let core = core.expect("the deck has checked section and material");
             (Box::new(core), Some(Turning::new(&spin, inertia)))
         }
-        Topology::Trusses { bars, .. } => {
+        Topology::Trusses { bars, area, cable } => {
             let material = materials.get(piece.material as usize).expect("trusses need their material");
-            let bars = bars.clone();
-            (Box::new(Trusses::of(piece, bars, material)), None)
+            let (bars, area_of_cable) = (bars.clone(), cable.map(|_| *area));
+            (Box::new(Trusses::of(piece, bars, area_of_cable, material)), None)
+        }
+        Topology::Springs { bars, spring } => {
+            let (bars, spring) = (bars.clone(), spring.clone());
+            (Box::new(Springs::of(piece, bars, spring)), None)
         }
         Topology::Beams { bars, section, .. } => {
             let ShellState { spin, inertia } = std::mem::take(&mut piece.shells);

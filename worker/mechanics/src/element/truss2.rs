@@ -3,8 +3,13 @@
 //! Its stress is uniaxial, so the bar thins as it stretches elastically and keeps its volume as it flows:
 //! `V / V0 = 1 + (1 - 2 nu) sigma / E`, and its section is `V / L`. The strain of a step is `2 (L - L') / (L + L')`, the logarithmic
 //! strain to third order. The elements are few and their arithmetic is short, so they are computed one at a time.
+//!
+//! A cable pulls and does not push. Its elastic strain is `ln(L / L0)` less its plastic strain, with `L0` its length without stress, and
+//! where that is negative it is slack: so it pulls again at just the length at which it fell slack, and needs no memory for that.
 
 use std::{fmt, mem::take};
+
+use serde::{Deserialize, Serialize};
 
 use super::{
     ElementVote, Fault, Step,
@@ -33,6 +38,13 @@ pub enum TrussError {
         /// What was given (area).
         area: f64,
     },
+    /// The material does not bear the tension at the start.
+    Tension {
+        /// What was given (force).
+        tension: f64,
+        /// What it bears at most (force).
+        most: f64,
+    },
     /// Uniaxial stress does not know the law.
     Law {
         /// Name of the material.
@@ -46,6 +58,12 @@ impl fmt::Display for TrussError {
         match self {
             TrussError::Area { area } => {
                 write!(f, "truss of area {area}, expected a positive area; give one")
+            }
+            TrussError::Tension { tension, most } => {
+                write!(
+                    f,
+                    "cable under tension {tension:?}, expected at most {most:.3e}, where it yields or is a fifth longer; give less"
+                )
             }
             TrussError::Law { material, law } => {
                 write!(f, "trusses of {material:?}: {law} carries no tension; take a material with strength")
@@ -64,7 +82,72 @@ pub fn check(area: f64, material: &Material) -> Result<(), TrussError> {
     if !(area.is_finite() && area > 0.0) {
         return Err(TrussError::Area { area });
     }
-    PlaneLaw::of(material).map_err(|law| TrussError::Law { material: material.name.clone(), law }).map(|_| ())
+    law_of(material).map(|_| ())
+}
+
+/// What makes trusses cables.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cable {
+    /// Length without stress over that in the mesh: 1 without tension at the start.
+    pub rest: f64,
+}
+
+/// The greatest elastic strain at the start.
+const MOST_STRAIN: f64 = 0.2;
+
+impl Cable {
+    /// The cable that pulls with this force at the start.
+    ///
+    /// # Errors
+    /// [`TrussError`] for a law without uniaxial stress, and a force at which the material yields or that stretches it by more than a fifth.
+    pub fn under(tension: f64, area: f64, material: &Material) -> Result<Self, TrussError> {
+        let law = law_of(material)?;
+        let thinner = 1.0 - 2.0 * law.poisson;
+        // By area without stress; it grows with the strain up to the most.
+        let pull = |strain: f64| law.young * strain * thinner.mul_add(strain, 1.0) * libm::exp(-strain);
+        let mut most = MOST_STRAIN;
+        if law.strength.plastic() {
+            let factor = law.strength.factor(Scalar(0.0), Scalar(material.initial_temperature()));
+            most = most.min(law.strength.flow(Scalar(0.0), factor).0.0 / law.young);
+        }
+        let wanted = tension / area;
+        if !(wanted >= 0.0 && wanted <= pull(most)) {
+            return Err(TrussError::Tension { tension, most: area * pull(most) });
+        }
+        if wanted == 0.0 {
+            return Ok(Self { rest: 1.0 });
+        }
+        let (mut low, mut high) = (0.0, most);
+        for _ in 0..100 {
+            let middle = 0.5 * (low + high);
+            if pull(middle) < wanted {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Ok(Self { rest: libm::exp(-high) })
+    }
+
+    /// The fields of its elements that are not as in any other at the start: stress and energy.
+    ///
+    /// # Panics
+    /// If the material has no strength.
+    pub(crate) fn at_start(&self, material: &Material) -> [(usize, f64); 4] {
+        let law = PlaneLaw::of(material).expect("the deck has checked the material");
+        if self.rest == 1.0 {
+            return [field::PRESSURE, field::SXX, field::SYY, field::ENERGY].map(|field| (field, 0.0));
+        }
+        let stress = -law.young * libm::log(self.rest);
+        let thinner = (1.0 - 2.0 * law.poisson) / law.young;
+        let energy = stress * stress / law.young * thinner.mul_add(stress / 3.0, 0.5);
+        let p = -stress / 3.0;
+        [(field::PRESSURE, p), (field::SXX, -2.0 * p), (field::SYY, p), (field::ENERGY, energy)]
+    }
+}
+
+fn law_of(material: &Material) -> Result<PlaneLaw, TrussError> {
+    PlaneLaw::of(material).map_err(|law| TrussError::Law { material: material.name.clone(), law })
 }
 
 /// The trusses of a block; arrays are by local element.
@@ -77,6 +160,8 @@ pub(crate) struct Trusses {
     elements: Vec<u32>,
     density: f64,
     law: PlaneLaw,
+    /// Of cables, their area without stress.
+    area_of_cable: Option<f64>,
 }
 
 impl Trusses {
@@ -84,7 +169,12 @@ impl Trusses {
     ///
     /// # Panics
     /// If the material has no strength.
-    pub fn of(piece: &mut Piece, bars: Vec<[u32; 2]>, material: &Material) -> Self {
+    pub fn of(
+        piece: &mut Piece,
+        bars: Vec<[u32; 2]>,
+        area_of_cable: Option<f64>,
+        material: &Material,
+    ) -> Self {
         Self {
             n_nodes: piece.nodes.len(),
             fields: take(&mut piece.fields),
@@ -94,6 +184,7 @@ impl Trusses {
             density: material.density,
             law: PlaneLaw::of(material).expect("the deck has checked the material"),
             bars,
+            area_of_cable,
         }
     }
 
@@ -119,7 +210,14 @@ impl Trusses {
         let pull_before = bar.stress * volume_of(bar.stress) / length_before;
         if step.dt > 0.0 {
             let strain = 2.0 * (length - length_before) / (length + length_before);
-            update(&self.law, &mut bar, strain, step.dt);
+            let trial = match self.area_of_cable {
+                None => self.law.young.mul_add(strain, bar.stress),
+                Some(area) => {
+                    let elastic = libm::log(length * area / volume) - bar.plastic_strain;
+                    self.law.young * elastic.max(0.0)
+                }
+            };
+            update(&self.law, &mut bar, trial, strain / step.dt);
         }
         let relative_volume = volume_of(bar.stress);
         // Forces are by initial volume until they are given to the nodes.
@@ -172,15 +270,14 @@ struct Bar {
     temperature: f64,
 }
 
-/// Adds an elastic increment and returns the stress to the yield stress.
-fn update(law: &PlaneLaw, bar: &mut Bar, strain: f64, dt: f64) {
-    let trial = law.young.mul_add(strain, bar.stress);
+/// Takes the elastic `trial` stress of a strain of this `rate` and returns it to the yield stress.
+fn update(law: &PlaneLaw, bar: &mut Bar, trial: f64, rate: f64) {
     bar.stress = trial;
     let strength: &AnyStrength = &law.strength;
     if !strength.plastic() {
         return;
     }
-    let factor = strength.factor(Scalar((strain / dt).abs()), Scalar(bar.temperature));
+    let factor = strength.factor(Scalar(rate.abs()), Scalar(bar.temperature));
     let start = bar.plastic_strain;
     let size = trial.abs();
     if size <= strength.flow(Scalar(start), factor).0.0 {

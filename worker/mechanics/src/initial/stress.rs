@@ -15,7 +15,7 @@ use crate::{
     element::{
         beam2,
         hex8::points::{OF_POINT, POINTS},
-        shell4, tet10,
+        shell4, spring2, tet10,
     },
     eos::{AnyEos, EquationOfState, Line},
     lanes::scalar::Scalar,
@@ -124,6 +124,15 @@ impl PointStress {
 pub fn stress_fault(part: &Part, material: &Material, points: &Points) -> Option<(String, &'static str)> {
     let is_laminate = part.section().is_some_and(|section| section.laminate.is_some());
     let name = &material.name;
+    match &part.topology {
+        Topology::Springs { .. } => {
+            return Some(("a stress of springs, which have forces".to_owned(), "other elements"));
+        }
+        Topology::Trusses { cable: Some(_), .. } => {
+            return Some(("a stress of cables".to_owned(), "the tension that their part gives them"));
+        }
+        _ => {}
+    }
     if material.is_gas() {
         let found = format!("a stress of {name:?}, whose pressure is that of its energy");
         return Some((found, "a solid or a fluid"));
@@ -183,6 +192,7 @@ pub fn stress(
                 Topology::Shells { section, .. } => {
                     lay_shell(state, first + e, &[x[0], x[1], x[2], x[3]], section, material, &entry.points)
                 }
+                Topology::Springs { .. } => Ok(()),
                 Topology::Trusses { .. } | Topology::Beams { .. } => {
                     lay_bar(state, first + e, [x[0], x[1]], part, material, &entry.points)
                 }
@@ -195,7 +205,7 @@ pub fn stress(
         }
     }
     state.mass = masses(mesh, setup, &state.initial_volume);
-    Ok(())
+    spring2::start(mesh, state)
 }
 
 /// Deviatoric stress xx, yy, xy, yz, zx, and zz, which is minus the sum of the first two.

@@ -24,7 +24,7 @@ pub fn twice([a, b, c, d]: [u32; 4]) -> [u32; 8] {
     [a, b, c, d, a, b, c, d]
 }
 
-/// The nodes of a truss or beam as the corners of a hexahedron: an end each.
+/// The nodes of a truss, spring or beam as the corners of a hexahedron: an end each.
 pub(crate) fn spread([a, b]: [u32; 2]) -> [u32; 8] {
     [a, b, b, a, a, b, b, a]
 }

@@ -240,7 +240,7 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
     least
 }
 
-/// Volume over the largest face; of a shell, area over the longest side; of a truss, its length.
+/// Volume over the largest face; of a shell, area over the longest side; of a truss or spring, its length.
 fn least_height(part: &Part, e: usize, x: &[[f64; 3]; 8]) -> f64 {
     match &part.topology {
         Topology::Structured { .. }
@@ -248,6 +248,7 @@ fn least_height(part: &Part, e: usize, x: &[[f64; 3]; 8]) -> f64 {
         | Topology::EightPoint { .. }
         | Topology::Tetrahedra { .. } => return hex8::volume(x) / largest_face(x),
         Topology::Trusses { area, .. } => return part.volume(e, x) / area,
+        Topology::Springs { .. } => return part.volume(e, x),
         Topology::Beams { section, .. } => return part.volume(e, x) / section.area,
         Topology::Shells { .. } => {}
     }
@@ -347,6 +348,7 @@ impl Moments {
                     }
                 }
             }
+            Topology::Springs { .. } => {}
             // Gauss's two points give the second moments of a line.
             Topology::Trusses { .. } => [-1.0, 1.0].iter().for_each(|side| {
                 let r = 0.5 * (1.0 + side / 3.0_f64.sqrt());

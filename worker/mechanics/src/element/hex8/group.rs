@@ -65,7 +65,10 @@ impl Solids {
                 let hexahedra: Vec<_> = tetrahedra.iter().map(tet10::collapsed).collect();
                 explicit(&hexahedra, in_runs(&hexahedra), n_nodes)
             }
-            Topology::Shells { .. } | Topology::Trusses { .. } | Topology::Beams { .. } => {
+            Topology::Shells { .. }
+            | Topology::Trusses { .. }
+            | Topology::Springs { .. }
+            | Topology::Beams { .. } => {
                 panic!("no hexahedra")
             }
         };
