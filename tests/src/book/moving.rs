@@ -10,7 +10,7 @@ use crate::{
 /// A jet whose pressure is a cone crosses a free steel plate from outside to outside: its force is the volume of the cone, for as
 /// long as its axis is over the plate on the whole.
 pub(super) fn a_jet_gives_a_plate_the_impulse_of_its_way(figures: &mut Figures) {
-    let (radius, pressure, speed, length) = (0.05, 1e5, 500.0, 1.0);
+    let (radius, pressure, speed, length) = (0.05, 1e7, 500.0, 1.0);
     let solved = run(model(&format!(
         "title = \"jet\"\nunits = \"SI\"\n[control]\nend_time = 2.3e-3\n[output]\nhistory_cycles = 20\n\
          [[part]]\nname = \"plate\"\nmaterial = \"STEEL_4340\"\n\
@@ -18,7 +18,7 @@ pub(super) fn a_jet_gives_a_plate_the_impulse_of_its_way(figures: &mut Figures) 
          [[rigid]]\nparts = [\"plate\"]\n\
          [[curve]]\nname = \"cone\"\npoints = [[0, 1], [{radius:?}, 0]]\n\
          [[load]]\ntype = \"moving-pressure\"\nface = \"k-max\"\npressure = {pressure:?}\nprofile = \"cone\"\nradius = {radius:?}\n\
-         axis = [0, 0, -1]\npoint = [-0.06, 0.1, 1]\nvelocity = {{ x = {speed:?} }}\n"
+         axis = [0, 0, -1]\npoints = 5\npoint = [-0.06, 0.1, 1]\nvelocity = {{ x = {speed:?} }}\n"
     )));
     let impulse = pressure * PI * radius * radius / 3.0 * length / speed;
     let last = solved.rows.last().expect("rows");
