@@ -4,7 +4,7 @@ use tests::solve::{Workers, model};
 
 use super::{fingerprint, losing_a_worker_changes_no_bit, same_bits, same_bits_on_route_direct};
 
-/// A block of two kinds of hexahedra under a stress that is in no equilibrium, which throws a bent sheet off.
+/// A block of two kinds of hexahedra under a stress that is in no equilibrium, on which a bent sheet falls.
 const STRESSED: &str = r#"
     title = "stressed"
     units = "SI"
@@ -24,8 +24,9 @@ const STRESSED: &str = r#"
     [[part]]
     name = "sheet"
     material = "STEEL_4340"
+    velocity = [0, 0, -20]
     shell = { thickness = 5e-4, points = 5 }
-    plate = { origin = [0, 0, 3.6e-3], side_i = [6e-3, 0, 0], side_j = [0, 6e-3, 0], cells = [6, 6] }
+    plate = { origin = [0, 0, 3.52e-3], side_i = [6e-3, 0, 0], side_j = [0, 6e-3, 0], cells = [6, 6] }
     [[join]]
     parts = ["block", "foot"]
     [[initial_stress]]
