@@ -33,7 +33,9 @@ pub(super) fn read(table: &Table<'_>) -> Option<Moving> {
                 true => components(table, "velocity"),
                 false => Some([const { None }; 3]),
             };
-            start.zip(velocity).map(|(start, velocity)| Path::Velocity { start, velocity })
+            start
+                .zip(velocity)
+                .map(|(start, velocity)| Path::Velocity { start, velocity: Box::new(velocity) })
         }
     };
     let mut pressure = pressure?;

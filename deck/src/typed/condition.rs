@@ -256,7 +256,7 @@ pub(crate) struct Moving {
 #[derive(Clone, Debug)]
 pub(crate) enum Path {
     /// From a place at the start by velocities; an axis without one stays.
-    Velocity { start: [f64; 3], velocity: Components },
+    Velocity { start: [f64; 3], velocity: Box<Components> },
     /// Time, x, y, z; times ascend, at least one.
     Places(Vec<[f64; 4]>),
 }

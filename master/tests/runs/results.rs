@@ -103,6 +103,7 @@ fn plates(cells: u32) -> Model {
         spin: Vec::new(),
         axes: Vec::new(),
         scatter: Vec::new(),
+        stress: Vec::new(),
         constraint: vec![0; n_nodes],
         join_energy: 0.0,
         setup: Setup {

@@ -175,7 +175,7 @@ fn way_of(t: &mut Translation<'_>, nozzle: &Nozzle) -> Option<(Path, [f64; 3])> 
         }
     }
     let start = t.vector(nozzle.at, "a nozzle at", origin);
-    Some((Path::Velocity { start, velocity }, t.vector(nozzle.at, "a jet along", axis)))
+    Some((Path::Velocity { start, velocity: Box::new(velocity) }, t.vector(nozzle.at, "a jet along", axis)))
 }
 
 /// Whether a node moves with an element or a rigid body.
