@@ -15,7 +15,7 @@ use tests::{
 
 use crate::{BOLIDE, digest_of, small};
 
-const CYCLES: &str = "1200";
+const CYCLES: &str = "2400";
 
 /// The run that nothing happens to.
 fn undisturbed() -> &'static Left {
