@@ -167,6 +167,7 @@ macro_rules! each_case_of_the_book {
             load: a_body_between_a_sphere_and_a_cylinder_stays_outside_both quick;
             stress: a_pulled_bar_that_is_let_go_unloads_by_a_wave quick;
             stress: plates_in_equilibrium_stay_as_they_are quick;
+            stress: pulled_bars_that_are_held_stay_as_they_are quick;
             stress: a_bent_strip_springs_back quick;
             stress: plastic_strain_at_the_start_has_hardened quick;
             erosion: an_element_that_leaves_a_block_uncovers_its_neighbours quick;

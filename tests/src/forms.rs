@@ -18,7 +18,7 @@ pub enum Cell {
 }
 
 /// Lists of nodes and elements of a bar of cubes of 4, as a deck has them.
-fn mesh(cells: [usize; 3], of: impl Fn([usize; 3]) -> Cell) -> String {
+pub(crate) fn mesh(cells: [usize; 3], of: impl Fn([usize; 3]) -> Cell) -> String {
     let [ni, nj, nk] = cells;
     let node = |[i, j, k]: [usize; 3]| 1 + i + (ni + 1) * (j + (nj + 1) * k);
     let (mut nodes, mut elements) = (Vec::new(), Vec::new());

@@ -457,15 +457,6 @@ fn rigid_bodies_have_the_same_bits_on_both_routes() {
         face = "k-min"
         pressure = { curve = "pulse", factor = 2e-3 }
         [[load]]
-        type = "moving-pressure"
-        parts = ["projectile"]
-        face = "k-max"
-        pressure = 1e-3
-        profile = "pulse"
-        radius = 1.5
-        axis = [0, 0, -1]
-        path = [[0, 2, 2, 9], [30, 5, 4, 9]]
-        [[load]]
         type = "force"
         parts = ["under"]
         face = "i-min"

@@ -64,6 +64,9 @@ fn every_row_of_the_reference_is_computed_by_a_case() {
         include_str!("../src/book/friction.rs"),
         include_str!("../src/book/order.rs"),
         include_str!("../src/book/spheres.rs"),
+        include_str!("../src/book/moving.rs"),
+        include_str!("../src/book/spring.rs"),
+        include_str!("../src/book/stress.rs"),
     ]
     .concat();
     for name in tests::case::names() {

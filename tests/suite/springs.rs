@@ -67,7 +67,8 @@ fn a_block_on_springs_and_cables_has_the_same_bits_on_any_workers() {
 #[test]
 fn a_spring_between_rigid_bodies_swings_them_by_their_masses() {
     let solved = run(model(
-        "title = \"rigid bodies on a spring\"\nunits = \"SI\"\n[control]\nend_time = 0.05\n[output]\nhistory_cycles = 1\n\
+        "title = \"rigid bodies on a spring\"\nunits = \"SI\"\n[control]\nend_time = 0.05\nsafety_factor = 0.1\n\
+         [output]\nhistory_cycles = 1\n\
          [[part]]\nname = \"light\"\nmaterial = \"CU_OFHC\"\nvelocity = [-1, 0, 0]\n\
          box = { origin = [-0.1, -0.05, -0.05], size = [0.1, 0.1, 0.1], cells = [2, 2, 2] }\n\
          [[part]]\nname = \"heavy\"\nmaterial = \"CU_OFHC\"\n\
