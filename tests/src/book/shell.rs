@@ -313,12 +313,12 @@ fn frequency(solved: &Solved, axis: usize) -> f64 {
 
 /// Balmer and Witmer's panel as in the room of structures, of shells with five points through the thickness. Half of it.
 pub(super) fn the_impulsive_panel_of_shells_is_dented_about_as_deep(figures: &mut Figures) {
-    impulsive_panel(figures, "shells", 1);
-    impulsive_panel(figures, "shells of four points", 4);
+    impulsive_panel(figures, "impulsive panel of shells", 1);
+    impulsive_panel(figures, "impulsive panel of shells of four points", 4);
 }
 
 /// The panel with so many points in the plane.
-fn impulsive_panel(figures: &mut Figures, kind: &str, in_plane: u32) {
+fn impulsive_panel(figures: &mut Figures, family: &str, in_plane: u32) {
     let (radius, thickness, length) = (2.9375 * INCH, 0.125 * INCH, 12.56 * INCH);
     let material = plastic(2.5e-4 * DENSITY, 10.5e6 * PSI, 0.33, 44_000.0 * PSI);
     let deck = format!(
@@ -353,9 +353,9 @@ fn impulsive_panel(figures: &mut Figures, kind: &str, in_plane: u32) {
     for (gauge, name) in [(0, "half way"), (1, "at three quarters")] {
         let start = solved.model.mesh.positions[solved.model.output.gauges[gauge].node as usize][1];
         let greatest = solved.rows.iter().map(|row| start - row.gauges[gauge].x[1]).fold(0.0, f64::max);
-        figures.add(&format!("impulsive panel of {kind} @ {name}, deflection (in)"), greatest / INCH);
+        figures.add(&format!("{family} @ {name}, deflection (in)"), greatest / INCH);
     }
-    figures.add(&format!("impulsive panel of {kind}: energy error"), solved.outcome.run_totals.last.error);
+    figures.add(&format!("{family} @ energy error"), solved.outcome.run_totals.last.error);
 }
 
 /// A tube of shells that a wall shortens at a speed.

@@ -113,9 +113,10 @@ pub(super) fn plates_in_equilibrium_stay_as_they_are(figures: &mut Figures) {
 
 /// Bars that are pulled and held at both ends, along no axis of the deck.
 pub(super) fn pulled_bars_that_are_held_stay_as_they_are(figures: &mut Figures) {
-    for (kind, section) in
-        [("truss", "truss = { area = 1e-4 }"), ("beam", "beam = { rectangle = [0.01, 0.02] }")]
-    {
+    for (kind, section) in [
+        ("truss", "truss = { area = 1e-4 }"),
+        ("beam", "beam = { rectangle = [0.01, 0.02], across = [0, 0, 1] }"),
+    ] {
         let deck = head(
             "end_cycle = 1000\nend_time = 1",
             &format!(
