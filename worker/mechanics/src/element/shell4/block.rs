@@ -77,7 +77,7 @@ impl Built {
             points: &self.points,
             thinning: self.thinning,
             breaks: self.breaks,
-            is_membrane: self.is_membrane,
+            bends: f64::from(!self.is_membrane),
             second_moment: self.points.iter().map(|(height, weight)| 0.25 * weight * height * height).sum(),
             dt: step.dt,
             force_magic: step.force_quantum.magic(),

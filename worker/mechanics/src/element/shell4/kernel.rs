@@ -55,8 +55,8 @@ pub(super) struct Constants<'a, W> {
     pub thinning: f64,
     /// Plastic strain at which a layer breaks.
     pub breaks: Option<f64>,
-    /// Whether the section is a membrane, which neither bends nor shears across its thickness.
-    pub is_membrane: bool,
+    /// 1, or 0 of a membrane, which neither bends nor shears across its thickness.
+    pub bends: f64,
     /// Mean square of the heights of the points over the square of the thickness: 1/12, and 0 of one point.
     pub second_moment: f64,
     pub dt: f64,
@@ -65,14 +65,6 @@ pub(super) struct Constants<'a, W> {
     /// Force quantum over moment quantum (1/length).
     pub inverse_arm: f64,
     pub energy_magic: f64,
-}
-
-impl<W> Constants<'_, W> {
-    /// Stiffness against shear across the thickness, of a material with this shear modulus.
-    #[inline(always)]
-    pub fn transverse(&self, modulus: f64) -> f64 {
-        if self.is_membrane { 0.0 } else { SHEAR * modulus }
-    }
 }
 
 /// The elements of some sets, with `P` points in the plane.
@@ -252,8 +244,7 @@ unsafe fn slots<L: Lane, W: Layers, const P: usize>(
     let (bxx, byy, largest) = g.squares();
     let h3 = h * h * h;
     let membrane_k = L::splat(4.0 / 3.0 * young) * h * g.area;
-    let plate = if c.is_membrane { 0.0 } else { 1.0 };
-    let bending_k = L::splat(plate * young / 9.0) * h3 * g.area;
+    let bending_k = L::splat(c.bends * young / 9.0) * h3 * g.area;
     let shear_k = L::splat(SHEAR * g_modulus) * h3;
     let stiffness = [
         membrane_k * bxx,
@@ -261,7 +252,7 @@ unsafe fn slots<L: Lane, W: Layers, const P: usize>(
         bending_k * byy,
         bending_k * bxx,
         L::splat(8.0 / 3.0) * shear_k * g.inverse_area,
-        L::splat(plate / 24.0) * shear_k * g.area,
+        L::splat(c.bends / 24.0) * shear_k * g.area,
     ];
     let share = answer.elastic.max(L::splat(SOFT));
     let (mut hourglass_power, mut hourglass_damped) = (zero, zero);

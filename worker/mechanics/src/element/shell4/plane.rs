@@ -11,7 +11,7 @@
 
 use super::{
     geometry::Geometry,
-    kernel::Constants,
+    kernel::{Constants, SHEAR},
     layers::{Layers, Resultants, Strains, hooke, scaled},
 };
 use crate::lanes::{Lane, SET};
@@ -142,6 +142,15 @@ pub(super) fn largest<L: Lane>(g: &Geometry<L>, of_gradients: L) -> L {
     of_gradients.max(L::splat(0.25) * g.inverse_area * g.inverse_area * sum)
 }
 
+/// What the section at one point gives: as [`Answer`].
+struct OfPoint<L> {
+    after: Resultants<L>,
+    power: L,
+    damped: L,
+    rise: L,
+    elastic: L,
+}
+
 /// Brings the layers of all points from `n-1` to `n`. `strains` are those of the middle, `rates` of the patterns, `g` the geometry in
 /// the middle of the step, `lag` the time within which rates of strain give the viscous stress.
 ///
@@ -151,61 +160,77 @@ pub(super) fn largest<L: Lane>(g: &Geometry<L>, of_gradients: L) -> L {
 pub(super) unsafe fn update<L: Lane, W: Layers, const P: usize>(
     layers: &mut [f64],
     c: &Constants<'_, W>,
-    (lane, alive): (usize, L::Mask),
-    (h, lag): (L, L),
+    lanes: (usize, L::Mask),
+    lengths: (L, L),
     strains: &Strains<L>,
     rates: &[L; PATTERNS],
     g: &Geometry<L>,
 ) -> Answer<L, P> {
+    if P == 1 {
+        // SAFETY: handed on from the caller.
+        let OfPoint { after, power, damped, rise, elastic } =
+            unsafe { at_point::<L, W>(layers, c, lanes, lengths, strains) };
+        return Answer { after: [after; P], power, damped, rise, elastic };
+    }
     let zero = L::splat(0.0);
-    let half = L::splat(0.5);
-    let [young, poisson, g_modulus] = c.law.moduli();
-    let plate = young / (1.0 - poisson * poisson);
-    let (stiff, coupled) = (L::splat(plate), L::splat(plate * poisson));
-    let (shear, transverse) = (L::splat(g_modulus), L::splat(c.transverse(g_modulus)));
-    let squares = L::splat(c.second_moment) * h * h;
+    let [_, poisson, _] = c.law.moduli();
     let mut answer =
         Answer { after: [Resultants::none(); P], power: zero, damped: zero, rise: zero, elastic: zero };
-    let points = (P > 1).then(|| Points::of(g));
+    let points = Points::of(g);
     let n_numbers = (W::SHARED + c.points.len() * W::BY_LAYER) * SET;
     let mut p = 0;
     while p < P {
-        let at = points.as_ref().map(|points| points.at(p));
-        let strains = match &at {
-            Some(at) => strained(strains, rates, at, g, poisson),
-            None => *strains,
-        };
-        let growth = Strains {
-            membrane: hooke(stiff, coupled, shear, &strains.membrane),
-            curvature: hooke(stiff, coupled, shear, &strains.curvature),
-            shear: [transverse * strains.shear[0], transverse * strains.shear[1]],
-        };
+        let at = points.at(p);
+        let strains = strained(strains, rates, &at, g, poisson);
         let of_point = &mut layers[p * n_numbers..][..n_numbers];
         // SAFETY: handed on from the caller.
-        let (before, after, elastic) = unsafe { W::update(of_point, c, lane, alive, h, &strains, &growth) };
-        let viscous = Resultants {
-            n: scaled(lag, &growth.membrane),
-            m: scaled(lag * squares, &growth.curvature),
-            q: [lag * growth.shear[0], lag * growth.shear[1]],
-        };
-        let power = half * before.plus(&after).power(&strains);
-        let damped = viscous.power(&strains);
-        let rise = (after.n[0] - before.n[0]) + (after.n[1] - before.n[1]);
-        answer.after[p] = after.plus(&viscous);
-        match &at {
-            Some(Point { share, .. }) => {
-                answer.power = share.mul_add(power, answer.power);
-                answer.damped = share.mul_add(damped, answer.damped);
-                answer.rise = share.mul_add(rise, answer.rise);
-                answer.elastic = share.mul_add(elastic, answer.elastic);
-            }
-            None => {
-                (answer.power, answer.damped, answer.rise, answer.elastic) = (power, damped, rise, elastic);
-            }
-        }
+        let of_point = unsafe { at_point::<L, W>(of_point, c, lanes, lengths, &strains) };
+        answer.after[p] = of_point.after;
+        answer.power = at.share.mul_add(of_point.power, answer.power);
+        answer.damped = at.share.mul_add(of_point.damped, answer.damped);
+        answer.rise = at.share.mul_add(of_point.rise, answer.rise);
+        answer.elastic = at.share.mul_add(of_point.elastic, answer.elastic);
         p += 1;
     }
     answer
+}
+
+/// Brings the layers of one point from `n-1` to `n`.
+///
+/// # Safety
+/// As [`Layers::update`].
+#[inline(always)]
+unsafe fn at_point<L: Lane, W: Layers>(
+    layers: &mut [f64],
+    c: &Constants<'_, W>,
+    (lane, alive): (usize, L::Mask),
+    (h, lag): (L, L),
+    strains: &Strains<L>,
+) -> OfPoint<L> {
+    let [young, poisson, g_modulus] = c.law.moduli();
+    let plate = young / (1.0 - poisson * poisson);
+    let (stiff, coupled) = (L::splat(plate), L::splat(plate * poisson));
+    let (shear, transverse) = (L::splat(g_modulus), L::splat(c.bends * SHEAR * g_modulus));
+    let growth = Strains {
+        membrane: hooke(stiff, coupled, shear, &strains.membrane),
+        curvature: hooke(stiff, coupled, shear, &strains.curvature),
+        shear: [transverse * strains.shear[0], transverse * strains.shear[1]],
+    };
+    // SAFETY: handed on from the caller.
+    let (before, after, elastic) = unsafe { W::update(layers, c, lane, alive, h, strains, &growth) };
+    let squares = L::splat(c.second_moment) * h * h;
+    let viscous = Resultants {
+        n: scaled(lag, &growth.membrane),
+        m: scaled(lag * squares, &growth.curvature),
+        q: [lag * growth.shear[0], lag * growth.shear[1]],
+    };
+    OfPoint {
+        power: L::splat(0.5) * before.plus(&after).power(strains),
+        damped: viscous.power(strains),
+        rise: (after.n[0] - before.n[0]) + (after.n[1] - before.n[1]),
+        after: after.plus(&viscous),
+        elastic,
+    }
 }
 
 /// The rates of strain at a point: those in the middle and what the patterns add.
