@@ -367,7 +367,8 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         if let Topology::Springs { spring, .. } = &part.topology {
             for at in index..index + part.n_elements() {
                 let length = state.initial_volume[at];
-                let pull = spring.reference(length, top_speed2.sqrt());
+                let speed = top_speed2.sqrt().max(length * spring2::fastest(state, at));
+                let pull = spring.reference(length, speed);
                 force = force.max(pull);
                 stored += 1e-3 * (pull * length);
                 sound = sound.max(length * spring2::fastest(state, at));

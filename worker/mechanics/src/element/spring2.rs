@@ -80,7 +80,15 @@ impl Line {
     /// What the points would have to be.
     fn fault(&self) -> Option<&'static str> {
         let ascends = self.points.windows(2).all(|pair| pair[0][0] < pair[1][0]);
-        (self.points.len() < 2 || !ascends).then_some("at least two points whose first numbers ascend")
+        if self.points.len() < 2 || !ascends {
+            return Some("at least two points whose first numbers ascend");
+        }
+        (self.greatest() == 0.0).then_some("a point whose force is not 0")
+    }
+
+    /// The greatest magnitude of the force at a point.
+    fn greatest(&self) -> f64 {
+        self.points.iter().map(|point| point[1].abs()).fold(0.0, f64::max)
     }
 
     fn at(&self, x: f64) -> f64 {
@@ -182,20 +190,13 @@ impl Damper {
 impl Spring {
     /// What the law would have to be, where each of its numbers is finite and none of those that have no sign is negative.
     pub fn fault(&self) -> Option<&'static str> {
-        if let Elastic::Curve(line) = &self.elastic
-            && let Some(fault) = line.fault()
-        {
+        if let Some(fault) = self.lines().find_map(Line::fault) {
             return Some(fault);
         }
-        if let Damper::Curve(line) = &self.damper {
-            let descends = line.points.windows(2).any(|pair| pair[1][1] < pair[0][1]);
-            match line.fault() {
-                None if descends || line.at(0.0) != 0.0 => {
-                    return Some("a force of the damper that does not fall and is 0 at rate 0");
-                }
-                None => {}
-                fault => return fault,
-            }
+        if let Damper::Curve(line) = &self.damper
+            && (line.points.windows(2).any(|pair| pair[1][1] < pair[0][1]) || line.at(0.0) != 0.0)
+        {
+            return Some("a force of the damper that does not fall and is 0 at rate 0");
         }
         match self.elastic {
             Elastic::Plastic { stiffness, tangent, .. } if tangent >= stiffness => {
@@ -231,12 +232,22 @@ impl Spring {
         Self { elastic, damper, offset: self.offset }
     }
 
-    /// What the force of such a spring may come to: at an elongation as large as its length, at the start, and where its nodes part at
-    /// a speed.
+    /// What the force of such a spring may come to, above 0 for a law without [fault](Spring::fault): where it is drawn by its length, at
+    /// the start, at the points of curves, and where its nodes part at a speed.
     pub(crate) fn reference(&self, length: f64, speed: f64) -> f64 {
         let at_start = self.elastic.force(self.offset, &mut Plastic::default()).abs();
         let drawn = self.elastic.stiffness() * length;
-        drawn.max(at_start).max(self.damper.force(speed).abs()).max(self.damper.force(-speed).abs())
+        let rubbed = self.damper.damping() * speed;
+        [drawn, rubbed, self.lines().map(Line::greatest).fold(0.0, f64::max)]
+            .into_iter()
+            .fold(at_start, f64::max)
+    }
+
+    /// Its curves.
+    fn lines(&self) -> impl Iterator<Item = &Line> {
+        let elastic = if let Elastic::Curve(line) = &self.elastic { Some(line) } else { None };
+        let damper = if let Damper::Curve(line) = &self.damper { Some(line) } else { None };
+        elastic.into_iter().chain(damper)
     }
 }
 
@@ -371,6 +382,7 @@ mod tests {
         for points in [
             &[[0.0, 0.0]][..],
             &[[0.0, 0.0], [0.0, 1.0]],
+            &[[0.0, 0.0], [1.0, 0.0]],
             &[[0.0, 1.0], [1.0, 2.0]],
             &[[0.0, 0.0], [1.0, -1.0]],
         ] {
