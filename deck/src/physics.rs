@@ -260,8 +260,8 @@ impl Sums {
             let x = corners.map(|n| model.mesh.positions[n as usize]);
             let longest = longest_edge(&x);
             let thinnest = match &part.topology {
-                Topology::Shells { section, .. } => {
-                    v / (part.thickness_of(e).unwrap_or(section.thickness) * longest)
+                Topology::Shells { section, thicknesses, .. } => {
+                    v / (section.thickness_of(thicknesses, e) * longest)
                 }
                 Topology::Trusses { .. } | Topology::Springs { .. } | Topology::Beams { .. } => longest,
                 // A third of the least height: a node stands half-way up.

@@ -88,3 +88,16 @@ fn a_spring_between_rigid_bodies_swings_them_by_their_masses() {
     let error = solved.rows.iter().map(|row| row.error.abs()).fold(0.0, f64::max);
     assert!(error < 2e-3, "{error}");
 }
+
+#[test]
+fn a_damper_at_rest_is_drawn_by_a_force_at_the_speed_that_it_allows() {
+    let solved = run(model(
+        "title = \"a damper at rest\"\nunits = \"SI\"\n[control]\nend_time = 1\n[output]\nhistory_cycles = 1\n\
+         [[part]]\nname = \"damper\"\nspring = { damper_points = [[-1, -20], [0, 0], [1, 20]] }\n\
+         mesh = { nodes = [[1, 0, 0, 0], [2, 1, 0, 0]], elements = [[1, 1, 2]] }\n\
+         [[mass]]\nnodes = [1, 2]\nmass = 0.5\n[[boundary]]\ntype = \"fixed\"\nnodes = [1]\n\
+         [[load]]\ntype = \"force\"\nnodes = [2]\nforce = [6, 0, 0]\n[[gauge]]\nname = \"end\"\nnode = 2\n",
+    ));
+    let speed = solved.rows.last().expect("rows").gauges[0].v[0];
+    assert!((speed / 0.3 - 1.0).abs() < 1e-6, "{speed}");
+}

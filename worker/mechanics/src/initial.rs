@@ -269,10 +269,10 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
                 inertia_of[e] = material.density * state.initial_volume[e] * section.polar();
             }
         }
-        let Some(section) = part.section() else { continue };
+        let Topology::Shells { section, thicknesses, .. } = &part.topology else { continue };
         for local in 0..part.n_elements() {
             let e = first + local;
-            let thickness = part.thickness_of(local).unwrap_or(section.thickness);
+            let thickness = section.thickness_of(thicknesses, local);
             fields[shell4::THICKNESS][e] = thickness;
             for layer in fields[shell4::ELEMENT..section.n_fields()].chunks_mut(shell4::LAYER) {
                 layer[shell4::LAYER - 1][e] = material.initial_temperature();
@@ -309,6 +309,9 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
 /// the start, 46 bits. Momentum: all mass at the greatest initial or prescribed speed, of walls too, a thousandth of the fastest
 /// sound, or the speed to which its internal energy at the start could bring a material, 50 bits; where loads act, which bring bodies at rest
 /// to speeds that no number of the deck has, a twentieth of the fastest sound. It must not depend on the end of the run: that may be another when it goes on.
+///
+/// Springs have no modulus: their force and energy are those at an elongation of their length, of which the energy counts by a tenth, and the
+/// momentum is that which this energy gives to all mass.
 pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     let speed2 = state.v.iter().map(|v| v.iter().map(|c| c * c).sum::<f64>()).fold(0.0, f64::max);
     let curves = &setup.loads.curves;
@@ -362,6 +365,8 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         .fold(0.0, f64::max);
     let mut arm = 0.0_f64;
     let (mut force, mut stored, mut sound, mut driven2) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+    // Energy of springs that are drawn by their length.
+    let mut drawn = 0.0;
     let mut index = 0;
     for part in &mesh.parts {
         if let Topology::Springs { spring, .. } = &part.topology {
@@ -370,8 +375,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
                 let speed = top_speed2.sqrt().max(length * spring2::fastest(state, at));
                 let pull = spring.reference(length, speed);
                 force = force.max(pull);
-                stored += 1e-3 * (pull * length);
-                sound = sound.max(length * spring2::fastest(state, at));
+                drawn += pull * length;
             }
             index += part.n_elements();
             continue;
@@ -389,9 +393,9 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
                 | Topology::EightPoint { .. }
                 | Topology::Tetrahedra { .. } => [largest_face(&x) * strength, 0.0],
                 // A shell pulls with its section; only loads act on its face.
-                Topology::Shells { section, .. } => {
+                Topology::Shells { section, thicknesses, .. } => {
                     let area = largest_face(&x);
-                    let thickness = part.thickness_of(e).unwrap_or(section.thickness);
+                    let thickness = section.thickness_of(thicknesses, e);
                     let force = (area.sqrt() * thickness * strength).max(area * pressure);
                     [force, area.sqrt()]
                 }
@@ -415,10 +419,12 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
             index += 1;
         }
     }
+    stored += 0.1 * drawn;
+    let total_mass: f64 = state.mass.iter().sum();
+    driven2 = driven2.max(2.0 * drawn / total_mass);
     let kinetic: f64 =
         state.v.iter().zip(&state.mass).map(|(v, m)| 0.5 * m * v.iter().map(|c| c * c).sum::<f64>()).sum();
     let spinning: f64 = setup.bodies.iter().map(|body| 0.5 * dot(body.start.spin, body.start.momentum)).sum();
-    let total_mass: f64 = state.mass.iter().sum();
     let least = if setup.loads.are_any() { 0.05 } else { 1e-3 } * sound;
     Quanta {
         force: Quantum::for_reference(force, 42),

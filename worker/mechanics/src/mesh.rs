@@ -139,6 +139,11 @@ impl Section {
         }
     }
 
+    /// Initial thickness of element `e` of a part, where `own` are those that its elements have of their own, or empty (length).
+    pub fn thickness_of(&self, own: &[f64], e: usize) -> f64 {
+        own.get(e).copied().unwrap_or(self.thickness)
+    }
+
     /// Number of arrays that such shells have of their own ([`crate::piece::Piece::own`]). The layers of a laminate have history variables instead.
     pub fn n_fields(&self) -> usize {
         match self.laminate {
@@ -272,9 +277,7 @@ impl Part {
     /// Initial thickness of element `e`, of a kind that has a thickness and no height (length).
     pub fn thickness_of(&self, e: usize) -> Option<f64> {
         match &self.topology {
-            Topology::Shells { section, thicknesses, .. } => {
-                Some(thicknesses.get(e).copied().unwrap_or(section.thickness))
-            }
+            Topology::Shells { section, thicknesses, .. } => Some(section.thickness_of(thicknesses, e)),
             _ => None,
         }
     }
@@ -362,9 +365,8 @@ impl Part {
             | Topology::Explicit { .. }
             | Topology::EightPoint { .. }
             | Topology::Tetrahedra { .. } => hex8::volume(x),
-            Topology::Shells { section, .. } => {
-                let thickness = self.thickness_of(e).unwrap_or(section.thickness);
-                quad_area(&[x[0], x[1], x[2], x[3]]) * thickness
+            Topology::Shells { section, thicknesses, .. } => {
+                quad_area(&[x[0], x[1], x[2], x[3]]) * section.thickness_of(thicknesses, e)
             }
             Topology::Trusses { area, cable, .. } => {
                 let volume = distance(x[0], x[1]) * area;

@@ -1,9 +1,6 @@
 //! Charges of keyword decks.
 
-use deck::{
-    Model, Reading,
-    bundle::{self, Options},
-};
+use deck::{Model, Reading};
 use mechanics::load::{
     Span, SurfaceKind,
     blast::{Burst, Charge},
@@ -22,13 +19,7 @@ fn good(more: &str) -> Model {
     let text = cube(more);
     let Reading { model, .. } =
         deck::read_whole(&text, "a.k").unwrap_or_else(|faults| panic!("{faults:#?}\n{text}"));
-    let converted = deck::convert(&text, "a.k", "out.mesh").expect("it was read");
-    let mesh = converted.mesh;
-    let mut open = |path: &str| (path == "some/out.mesh").then(|| mesh.clone());
-    let packed =
-        bundle::gather("some/out.toml", converted.deck, &Options::default(), &mut open).expect("two files");
-    let again = deck::read(&packed, "out.toml").unwrap_or_else(|faults| panic!("{faults:#?}"));
-    assert_eq!(format!("{again:?}"), format!("{model:?}"));
+    assert_eq!(format!("{:?}", super::converted(&text, "a.k")), format!("{model:?}"));
     model
 }
 

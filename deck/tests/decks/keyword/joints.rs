@@ -1,9 +1,6 @@
 //! Joints of keyword decks: which bodies their nodes name, and what is refused.
 
-use deck::{
-    Fault, Model, Reading,
-    bundle::{self, Options},
-};
+use deck::{Fault, Model, Reading};
 use mechanics::joint::{Joint, Kind};
 
 /// Two rigid cubes of 10 side by side, parts 1 and 2, a strip of shells with a nodal rigid body of its first two nodes, and nodes on the
@@ -87,11 +84,7 @@ fn joints_hold_the_bodies_whose_nodes_they_name() {
 fn a_converted_deck_has_the_same_joints() {
     let more =
         "*CONSTRAINED_JOINT_REVOLUTE_LOCAL_ID\n4,pin\n31,32,33,34\n2\n*CONSTRAINED_JOINT_SPHERICAL\n36,37\n";
-    let deck::Converted { deck: text, mesh, .. } =
-        deck::convert(&deck_of(more), "a.k", "out.mesh").unwrap_or_else(|f| panic!("{}", lines(&f)));
-    let mut open = |path: &str| (path == "out.mesh").then(|| mesh.clone());
-    let packed = bundle::gather("out.toml", text, &Options::default(), &mut open).expect("two files");
-    let again = deck::read(&packed, "out.toml").unwrap_or_else(|f| panic!("{}", lines(&f)));
+    let again = super::converted(&deck_of(more), "a.k");
     assert_eq!(again, whole(more).model);
     assert_eq!(again.output.joints, ["pin", "2"]);
 }

@@ -1,6 +1,6 @@
 //! Laws of keyword decks that our declared laws have: constants, the equation of state that the card gives, and what is refused.
 
-use deck::{Model, bundle};
+use deck::Model;
 use mechanics::{
     erosion::Criteria,
     material::{Eos, Failure, Material, Strength},
@@ -41,11 +41,7 @@ fn beside_a_shock_line(card: &str) -> String {
 
 fn of_deck(text: &str) -> Material {
     let model = read(text);
-    let converted = deck::convert(text, "a.k", "out.mesh").expect("it was read");
-    let mesh = converted.mesh;
-    let mut open = |path: &str| (path == "some/out.mesh").then(|| mesh.clone());
-    let packed = bundle::gather("some/out.toml", converted.deck, &bundle::Options::default(), &mut open);
-    let again = deck::read(&packed.expect("two files"), "out.toml").expect("it was written");
+    let again = super::converted(text, "a.k");
     assert_eq!(again.setup.materials, model.setup.materials);
     model.setup.materials.into_iter().next().expect("a material")
 }

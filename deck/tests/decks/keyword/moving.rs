@@ -1,9 +1,6 @@
 //! `*LOAD_MOVING_PRESSURE`.
 
-use deck::{
-    Model,
-    bundle::{self, Options},
-};
+use deck::Model;
 use mechanics::load::{
     Drive, SurfaceKind,
     moving::{MovingPressure, Path},
@@ -25,13 +22,7 @@ const JET: &str = "*LOAD_MOVING_PRESSURE\n4\n91,92,1,20,2\n5,0,9\n";
 fn good(more: &str) -> Model {
     let text = deck_of(more);
     let model = deck::read(&text, "a.k").unwrap_or_else(|faults| panic!("{faults:#?}\n{text}"));
-    let converted = deck::convert(&text, "a.k", "out.mesh").expect("it was read");
-    let mesh = converted.mesh;
-    let mut open = |path: &str| (path == "some/out.mesh").then(|| mesh.clone());
-    let packed =
-        bundle::gather("some/out.toml", converted.deck, &Options::default(), &mut open).expect("two files");
-    let again = deck::read(&packed, "out.toml").unwrap_or_else(|faults| panic!("{faults:#?}"));
-    assert_eq!(format!("{again:?}"), format!("{model:?}"));
+    assert_eq!(format!("{:?}", super::converted(&text, "a.k")), format!("{model:?}"));
     model
 }
 

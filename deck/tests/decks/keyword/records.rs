@@ -1,7 +1,7 @@
 //! Cards that decks of other programs' users often have: inertias of parts, volumes at which fluids fail, forces along the
 //! axes of a system, histories of elements, sets in steps.
 
-use deck::{Model, bundle};
+use deck::Model;
 use mechanics::{load::SurfaceKind, material::Eos};
 
 /// Two cubes of side 1 mm in a row, of parts 1 and 2 that do not touch; solids 1 and 2, a shell of part 3 with number 1 far from them.
@@ -36,11 +36,7 @@ fn read(text: &str) -> Model {
 fn good(first: &str, material: &str, more: &str) -> Model {
     let text = deck_of(first, material, more);
     let model = read(&text);
-    let converted = deck::convert(&text, "a.k", "out.mesh").expect("it was read");
-    let mesh = converted.mesh;
-    let mut open = |path: &str| (path == "some/out.mesh").then(|| mesh.clone());
-    let packed = bundle::gather("some/out.toml", converted.deck, &bundle::Options::default(), &mut open);
-    let again = deck::read(&packed.expect("two files"), "out.toml").expect("it was written");
+    let again = super::converted(&text, "a.k");
     assert_eq!(again.setup.bodies, model.setup.bodies);
     assert_eq!(again.setup.loads, model.setup.loads);
     assert_eq!(again.setup.erosion, model.setup.erosion);

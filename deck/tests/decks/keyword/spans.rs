@@ -1,9 +1,6 @@
 //! Conditions of keyword decks that begin and end, turn on circles or along vectors, and belong to parts; masses and rigid bodies of nodes.
 
-use deck::{
-    Model, Reading,
-    bundle::{self, Options},
-};
+use deck::{Model, Reading};
 use mechanics::load::Span;
 
 /// Two cubes 1 apart, of part 1 (nodes 1 to 8) and of part 2 (nodes 11 to 18), and what is added to them.
@@ -26,14 +23,7 @@ fn read(more: &str) -> Reading {
     let text = cubes(more);
     let reading = deck::read_whole(&text, "a.k").unwrap_or_else(|faults| panic!("{faults:#?}\n{text}"));
     // What `convert` writes is the same problem.
-    let converted = deck::convert(&text, "a.k", "out.mesh").unwrap_or_else(|faults| panic!("{faults:#?}"));
-    let mesh = converted.mesh;
-    let mut open = |path: &str| (path == "some/out.mesh").then(|| mesh.clone());
-    let toml = converted.deck.clone();
-    let packed =
-        bundle::gather("some/out.toml", converted.deck, &Options::default(), &mut open).expect("two files");
-    let again = deck::read(&packed, "out.toml").unwrap_or_else(|faults| panic!("{faults:#?}\n{toml}"));
-    assert_eq!(format!("{again:?}"), format!("{:?}", reading.model), "{toml}");
+    assert_eq!(format!("{:?}", super::converted(&text, "a.k")), format!("{:?}", reading.model), "{text}");
     reading
 }
 

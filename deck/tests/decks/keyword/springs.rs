@@ -141,12 +141,7 @@ fn a_converted_deck_has_the_same_springs_and_cables() {
                  *ELEMENT_BEAM\n9,3,1,2\n*PART\ndamper\n4,2,4\n*MAT_DAMPER_NONLINEAR_VISCOUS\n4,5\n*ELEMENT_DISCRETE\n10,4,2,8\n";
     for law in ["*MAT_SPRING_ELASTOPLASTIC\n2,30.0,3.0,9.0", "*MAT_SPRING_NONLINEAR_ELASTIC\n2,5"] {
         let text = sprung(law, ",0,2.0,0,0.1", &format!("{cable}{CURVE}"));
-        let converted = deck::convert(&text, "a.k", "out.mesh").unwrap_or_else(|f| panic!("{}", lines(&f)));
-        let mesh = converted.mesh;
-        let mut open = |_: &str| Some(mesh.clone());
-        let bundle =
-            bundle::gather("out.toml", converted.deck, &Options::default(), &mut open).expect("two files");
-        let again = deck::read(&bundle, "out.toml").unwrap_or_else(|f| panic!("{}", lines(&f)));
+        let again = converted(&text, "a.k");
         let whole = read(&text).unwrap_or_else(|f| panic!("{}", lines(&f)));
         assert!(again.mesh == whole.mesh && again.setup.materials == whole.setup.materials, "{law}");
     }

@@ -98,6 +98,40 @@ macro_rules! slots_of_solids {
 }
 pub(crate) use slots_of_solids;
 
+/// The methods of [`Group`] of a kind of two nodes whose slots are its elements: of its fields `n_nodes`, `alive`, `elements` and `bars`.
+macro_rules! slots_of_bars {
+    () => {
+        fn reach(&self) -> usize {
+            self.n_nodes
+        }
+
+        fn alive(&self) -> &[u8] {
+            &self.alive
+        }
+
+        fn alive_mut(&mut self) -> &mut [u8] {
+            &mut self.alive
+        }
+
+        fn n_elements(&self) -> usize {
+            self.elements.len()
+        }
+
+        fn global(&self, slot: usize) -> u32 {
+            self.elements[slot]
+        }
+
+        fn slot(&self, element: usize) -> usize {
+            element
+        }
+
+        fn corners(&self, element: usize) -> [u32; 8] {
+            crate::mesh::spread(self.bars[element])
+        }
+    };
+}
+pub(crate) use slots_of_bars;
+
 /// Element arrays of a [`Piece`], by local element.
 pub(crate) struct ElementArrays {
     /// Volume at time zero.

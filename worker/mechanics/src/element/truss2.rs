@@ -13,14 +13,13 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     ElementVote, Fault, Step,
-    group::{Call, ElementArrays, Group, all_alive, living},
+    group::{Call, ElementArrays, Group, all_alive, living, slots_of_bars},
     place::Nodal,
 };
 use crate::{
     flip::Target,
     lanes::{SET, scalar::Scalar},
     material::Material,
-    mesh::spread,
     piece::Piece,
     spin::Turning,
     state::{N_FIELDS, field},
@@ -303,33 +302,7 @@ fn update(law: &PlaneLaw, bar: &mut Bar, trial: f64, rate: f64) {
 }
 
 impl Group for Trusses {
-    fn reach(&self) -> usize {
-        self.n_nodes
-    }
-
-    fn alive(&self) -> &[u8] {
-        &self.alive
-    }
-
-    fn alive_mut(&mut self) -> &mut [u8] {
-        &mut self.alive
-    }
-
-    fn n_elements(&self) -> usize {
-        self.elements.len()
-    }
-
-    fn global(&self, slot: usize) -> u32 {
-        self.elements[slot]
-    }
-
-    fn slot(&self, element: usize) -> usize {
-        element
-    }
-
-    fn corners(&self, element: usize) -> [u32; 8] {
-        spread(self.bars[element])
-    }
+    slots_of_bars!();
 
     fn compute(
         &mut self,

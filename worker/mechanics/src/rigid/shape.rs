@@ -328,9 +328,8 @@ impl Moments {
                     .iter()
                     .for_each(|x| self.add_tetrahedron(x, density));
             }
-            Topology::Shells { section, .. } => {
-                let thickness = part.thickness_of(e).unwrap_or(section.thickness);
-                self.add_shell(&[x[0], x[1], x[2], x[3]], mass, thickness);
+            Topology::Shells { section, thicknesses, .. } => {
+                self.add_shell(&[x[0], x[1], x[2], x[3]], mass, section.thickness_of(thicknesses, e));
             }
             // Gauss's two points give the second moments of a line, four about each those of the section.
             Topology::Beams { section, across, .. } => {

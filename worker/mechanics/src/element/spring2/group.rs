@@ -6,12 +6,11 @@ use super::{DAMPED, FORCE, N_OWN, PLASTIC, Plastic, SLIP, STIFF, Spring, norm, r
 use crate::{
     element::{
         ElementVote, Fault, Step,
-        group::{Call, ElementArrays, Group, all_alive, living},
+        group::{Call, ElementArrays, Group, all_alive, living, slots_of_bars},
         place::Nodal,
     },
     flip::Target,
     lanes::SET,
-    mesh::spread,
     piece::Piece,
     spin::Turning,
     state::{N_FIELDS, field},
@@ -99,33 +98,7 @@ impl Springs {
 }
 
 impl Group for Springs {
-    fn reach(&self) -> usize {
-        self.n_nodes
-    }
-
-    fn alive(&self) -> &[u8] {
-        &self.alive
-    }
-
-    fn alive_mut(&mut self) -> &mut [u8] {
-        &mut self.alive
-    }
-
-    fn n_elements(&self) -> usize {
-        self.elements.len()
-    }
-
-    fn global(&self, slot: usize) -> u32 {
-        self.elements[slot]
-    }
-
-    fn slot(&self, element: usize) -> usize {
-        element
-    }
-
-    fn corners(&self, element: usize) -> [u32; 8] {
-        spread(self.bars[element])
-    }
+    slots_of_bars!();
 
     fn compute(
         &mut self,
