@@ -4,6 +4,8 @@
 //! sub-domains and units at one time. A unit stays with the worker that owns most of its nodes' elements unless that
 //! worker has more than its share; then its lightest-bound units go to the workers with the most room. Deterministic.
 
+use std::collections::BTreeSet;
+
 use mechanics::contact::WorkUnit;
 
 /// What work costs in a cycle, in element-cycles.
@@ -13,12 +15,24 @@ pub struct Costs {
     pub node: f64,
     /// A node-face pair.
     pub pair: f64,
+    /// A message, at each of its ends.
+    pub message: f64,
+    /// Its way between two hosts.
+    pub travel: f64,
+    /// A byte on the wire of a host, whatever the host's speed.
+    pub byte: f64,
+}
+
+impl Costs {
+    /// Only elements cost anything.
+    pub const NONE: Self = Self { node: 0.0, pair: 0.0, message: 0.0, travel: 0.0, byte: 0.0 };
 }
 
 impl Default for Costs {
-    /// Of this code with the widest lanes (`bolide simulate --measure-costs`).
+    /// Of this code with the widest lanes (`bolide simulate --measure-costs`): 48 ns an element, 3.1 us a message; 15 us of a switch and
+    /// 1 Gb/s are what labs have.
     fn default() -> Self {
-        Self { node: 0.09, pair: 1.2 }
+        Self { node: 0.09, pair: 1.2, message: 65.0, travel: 310.0, byte: 0.17 }
     }
 }
 
@@ -122,11 +136,12 @@ pub fn assign_to_owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usi
     owners(units, n, owner).into_iter().map(|(worker, _)| worker).collect()
 }
 
-/// Worker of each unit. `weights` are the units' pairs, of which one costs `pair`; `work` is what the workers' sub-domains
-/// cost, both in element-cycles; `owner` gives the worker that owns a surface node's elements.
+/// Worker of each unit. `weights` are the units' pairs; `work` is what the workers' sub-domains cost (element-cycles); `owner` gives the
+/// worker that owns a surface node's elements. A worker that finishes late by less than the messages of two new neighbours keeps its units,
+/// and it gives them to those with which it exchanges nodes in any case, unless another one would finish earlier by more than these messages.
 pub fn assign(
     units: &[WorkUnit],
-    (weights, pair): (&[u64], f64),
+    (weights, costs): (&[u64], Costs),
     speeds: &[f64],
     work: &[f64],
     owner: &dyn Fn(u32) -> usize,
@@ -135,37 +150,71 @@ pub fn assign(
     if n == 1 {
         return vec![0; units.len()];
     }
+    let Costs { pair, message, .. } = costs;
     let (mut chosen, bound): (Vec<usize>, Vec<usize>) = owners(units, n, owner).into_iter().unzip();
     let mut load = vec![0_u64; n];
     for (weight, &worker) in weights.iter().zip(&chosen) {
         load[worker] += weight;
     }
-    let limit = level(speeds, work, pair * load.iter().sum::<u64>() as f64) * (1.0 + TOLERANCE);
+    let level = level(speeds, work, pair * load.iter().sum::<u64>() as f64);
+    let limit = |w: usize| level.mul_add(1.0 + TOLERANCE, NEIGHBOUR * message / speeds[w]);
     let finish = |w: usize, load: u64| pair.mul_add(load as f64, work[w]) / speeds[w];
-    let mut giving: Vec<usize> =
-        (0..units.len()).filter(|&u| weights[u] > 0 && finish(chosen[u], load[chosen[u]]) > limit).collect();
+    let is_late = |u: &usize| weights[*u] > 0 && finish(chosen[*u], load[chosen[*u]]) > limit(chosen[*u]);
+    let mut giving: Vec<usize> = (0..units.len()).filter(is_late).collect();
+    if giving.is_empty() {
+        return chosen;
+    }
+    let mut known = if message > 0.0 { met(units, &chosen, n, owner) } else { Vec::new() };
     // Loosely bound units first, the heavier of equals first: fewer moves.
     giving.sort_by_key(|&u| (bound[u], std::cmp::Reverse(weights[u]), u));
     for u in giving {
         let (from, weight) = (chosen[u], weights[u]);
         let before = finish(from, load[from]);
-        if before <= limit {
+        if before <= limit(from) {
             continue;
         }
-        let after = |w: usize| finish(w, load[w] + weight);
+        let after = |w: usize| {
+            let is_new = message > 0.0 && w != from && !known[from].contains(&w);
+            finish(w, load[w] + weight) + if is_new { NEIGHBOUR * message / speeds[w] } else { 0.0 }
+        };
         let to = (0..n).fold(0, |best, w| if after(w) < after(best) { w } else { best });
         if to != from && after(to) < before {
             load[from] -= weight;
             load[to] += weight;
             chosen[u] = to;
+            if message > 0.0 {
+                known[from].insert(to);
+                known[to].insert(from);
+            }
         }
     }
     chosen
 }
 
+/// Messages that a worker sends and receives in a cycle for two more neighbours: the owner of a unit's elements, and another one.
+const NEIGHBOUR: f64 = 4.0;
+
+/// By worker: those that own nodes of its units.
+fn met(units: &[WorkUnit], chosen: &[usize], n: usize, owner: &dyn Fn(u32) -> usize) -> Vec<BTreeSet<usize>> {
+    let mut met = vec![BTreeSet::new(); n];
+    for (unit, &worker) in units.iter().zip(chosen) {
+        let mut last = worker;
+        for other in unit.nodes.iter().map(|&node| owner(node)) {
+            if other != last && other != worker {
+                met[worker].insert(other);
+                met[other].insert(worker);
+            }
+            last = other;
+        }
+    }
+    met
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const PAIRS: Costs = Costs { pair: 1.2, ..Costs::NONE };
 
     fn unit(i: i32, nodes: Vec<u32>, interactions: u64) -> WorkUnit {
         WorkUnit { cube: [i, 0, 0], nodes, faces: vec![0], interactions, ..WorkUnit::default() }
@@ -175,7 +224,10 @@ mod tests {
     fn units_stay_with_the_owner_of_their_nodes_when_loads_fit() {
         let units: Vec<_> = (0..8).map(|i| unit(i, vec![i as u32], 10)).collect();
         let owner = |n: u32| (n % 2) as usize;
-        assert_eq!(assign(&units, (&[10; 8], 1.2), &[1.0, 1.0], &[1e4; 2], &owner), [0, 1, 0, 1, 0, 1, 0, 1]);
+        assert_eq!(
+            assign(&units, (&[10; 8], PAIRS), &[1.0, 1.0], &[1e4; 2], &owner),
+            [0, 1, 0, 1, 0, 1, 0, 1]
+        );
     }
 
     #[test]
@@ -189,7 +241,7 @@ mod tests {
     fn an_overloaded_worker_gives_units_until_shares_follow_speeds() {
         let units: Vec<_> = (0..400).map(|i| unit(i, vec![i as u32], 10)).collect();
         let speeds = [1.0, 2.0, 1.0];
-        let chosen = assign(&units, (&[10; 400], 1.2), &speeds, &[500.0, 1000.0, 500.0], &|_| 0);
+        let chosen = assign(&units, (&[10; 400], PAIRS), &speeds, &[500.0, 1000.0, 500.0], &|_| 0);
         for (w, s) in speeds.iter().enumerate() {
             let load = chosen.iter().filter(|&&c| c == w).count() as f64;
             let share = 100.0 * s;
@@ -201,7 +253,7 @@ mod tests {
     fn contact_levels_what_index_planes_left_uneven() {
         assert!((level(&[1.0, 1.0, 2.0], &[100.0, 110.0, 220.0], 40.0) - 117.5).abs() < 1e-9);
         let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 1)).collect();
-        let chosen = assign(&units, (&[1; 100], 1.2), &[1.0, 1.0], &[1000.0, 1060.0], &|_| 1);
+        let chosen = assign(&units, (&[1; 100], PAIRS), &[1.0, 1.0], &[1000.0, 1060.0], &|_| 1);
         let first = chosen.iter().filter(|&&w| w == 0).count();
         // 120 elements' worth of pairs: 90 to the first, 30 to the other.
         assert!((70..=76).contains(&first), "{first}");
@@ -211,7 +263,7 @@ mod tests {
     fn a_worker_that_ends_its_elements_last_gets_no_contact() {
         assert_eq!(level(&[1.0, 1.0], &[100.0, 110.0], 8.0), 108.0);
         let units: Vec<_> = (0..6).map(|i| unit(i, vec![i as u32], 1)).collect();
-        assert_eq!(assign(&units, (&[1; 6], 1.2), &[1.0, 1.0], &[100.0, 110.0], &|_| 1), [0; 6]);
+        assert_eq!(assign(&units, (&[1; 6], PAIRS), &[1.0, 1.0], &[100.0, 110.0], &|_| 1), [0; 6]);
     }
 
     #[test]
@@ -221,5 +273,21 @@ mod tests {
         assert!((left[0] - 0.6).abs() < 1e-12 && left[1..] == [1.0; 3], "{left:?}");
         assert_eq!(beside_sorts(&[1.0; 2], &[true; 2], 1000.0, 350.0, 4), [1.0; 2], "all share it");
         assert_eq!(beside_sorts(&[2.0, 1.0], &[true, false], 1.0, 350.0, 4), [0.2, 1.0], "never less");
+    }
+
+    #[test]
+    fn units_move_to_few_workers_and_not_for_less_than_their_messages_cost() {
+        let units: Vec<_> = (0..400).map(|i| unit(i, vec![i as u32, 1000 + i as u32 % 2], 10)).collect();
+        let owner = |node: u32| if node >= 1000 { (node - 1000) as usize } else { 0 };
+        let receivers = |message: f64, first: f64| {
+            let costs = Costs { message, ..PAIRS };
+            let work: Vec<f64> = (0..20).map(|w| if w == 0 { first } else { 5000.0 }).collect();
+            let chosen = assign(&units, (&[10; 400], costs), &[1.0; 20], &work, &owner);
+            chosen.into_iter().filter(|&w| w != 0).collect::<BTreeSet<_>>().len()
+        };
+        assert_eq!(receivers(0.0, 5000.0), 19, "all share what costs no message");
+        let few = receivers(65.0, 5000.0);
+        assert!((2..=19).contains(&few), "{few}");
+        assert_eq!(receivers(2000.0, 5000.0), 0, "4800 elements of pairs, 8000 of messages");
     }
 }

@@ -2,14 +2,19 @@
 //!
 //! Every part is cut among all workers, with the same grouping of workers for all parts, so that facing columns of
 //! neighbouring parts fall on one worker. Structured parts are cut along index planes (paper section 3), explicit
-//! ones by recursive coordinate bisection. The best of several groupings wins, by the
-//! slowest finish of elements and nodes ([`work`]). Elements that have eroded cost nothing ([`Living`]); they are dealt out
+//! ones by recursive coordinate bisection. Columns and slabs that are cut along two axes or one share nodes with fewer others than blocks
+//! do, which pays where messages cost more than nodes and wires are fast. The best of several groupings and sets of axes wins, by the
+//! slowest finish of elements, nodes ([`work`]) and messages. Elements that have eroded cost nothing ([`Living`]); they are dealt out
 //! all the same, since their state is still held.
+
+use std::collections::BTreeSet;
 
 use mechanics::{
     mesh::{Mesh, Topology},
     piece::Region,
 };
+
+use crate::balance::Costs;
 
 /// A sub-domain: a region of a part on a worker.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,35 +33,109 @@ const GROUPINGS: u64 = 25;
 /// How often a grouping is cut again, each time for shares corrected by what came of the last.
 const CORRECTIONS: usize = 4;
 
-/// Cuts the mesh for workers of these relative speeds, on which a node costs `node` elements. Sub-domains come part by part, shells first; those without elements are left
+/// Cuts the mesh for workers of these relative speeds. Sub-domains come part by part, shells first; those without elements are left
 /// out, so a worker may have none in a small problem. `alive` says by global index which elements cost anything; all do
 /// where it is none.
-pub fn decompose(mesh: &Mesh, speeds: &[f64], node: f64, alive: Option<&[bool]>) -> Vec<Subdomain> {
+pub fn decompose(mesh: &Mesh, speeds: &[f64], costs: Costs, alive: Option<&[bool]>) -> Vec<Subdomain> {
     let living = Living::new(mesh, alive);
     let mut best: Option<(f64, Vec<Subdomain>)> = None;
-    for seed in 0..GROUPINGS {
+    let equal = speeds.iter().all(|s| *s == speeds[0]);
+    let is_structured = |part: &mechanics::mesh::Part| matches!(part.topology, Topology::Structured { .. });
+    let choices = if costs.message > 0.0 && mesh.parts.iter().any(is_structured) { AXES } else { &AXES[..1] };
+    for seed in 0..if speeds.len() < 3 || equal { 1 } else { GROUPINGS } {
         let order = grouping(speeds, seed);
-        let equal = speeds.iter().all(|s| *s == speeds[0]);
-        let mut shares = speeds.to_vec();
-        for _ in 0..if equal { 1 } else { CORRECTIONS } {
-            let subdomains = cut_all(mesh, &shares, &order, &living);
-            let work = work(&subdomains, speeds.len(), node, &living);
-            let finish = work.iter().zip(speeds).map(|(w, s)| w / s).fold(0.0, f64::max);
-            let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
-            // Ragged pieces have more nodes: their workers get fewer elements in the next try.
-            for ((share, work), speed) in shares.iter_mut().zip(&work).zip(speeds) {
-                *share *= if *work > 0.0 { mean * speed / work } else { 1.0 };
+        for axes in choices {
+            let mut shares = speeds.to_vec();
+            for _ in 0..if equal { 1 } else { CORRECTIONS } {
+                let subdomains = cut_all(mesh, &shares, (&order, axes), &living);
+                let work = work(&subdomains, speeds.len(), costs.node, &living);
+                let finish = slowest(&work, speeds);
+                let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
+                // Ragged pieces have more nodes: their workers get fewer elements in the next try.
+                for ((share, work), speed) in shares.iter_mut().zip(&work).zip(speeds) {
+                    *share *= if *work > 0.0 { mean * speed / work } else { 1.0 };
+                }
+                // An equal finish keeps the earlier grouping, and the first is the order the user gave.
+                let is_better =
+                    |finish: f64| best.as_ref().is_none_or(|(least, _)| finish < *least * (1.0 - 1e-9));
+                if !is_better(finish) {
+                    continue;
+                }
+                let finish = if costs.message > 0.0 {
+                    let shared = Shared::new(&subdomains, speeds.len());
+                    slowest(&shared.add_messages(work, costs.message), speeds)
+                        .max(shared.on_a_wire(costs.byte))
+                } else {
+                    finish
+                };
+                if is_better(finish) {
+                    best = Some((finish, subdomains));
+                }
             }
-            // An equal finish keeps the earlier grouping, and the first is the order the user gave.
-            if best.as_ref().is_none_or(|(least, _)| finish < *least * (1.0 - 1e-9)) {
-                best = Some((finish, subdomains));
-            }
-        }
-        if speeds.len() < 3 || equal {
-            break;
         }
     }
     best.map(|(_, subdomains)| subdomains).unwrap_or_default()
+}
+
+/// What each worker's sub-domains cost in a cycle (element-cycles): living elements, nodes, and messages to those that share nodes.
+pub fn held(subdomains: &[Subdomain], n: usize, costs: Costs, living: &Living) -> Vec<f64> {
+    let work = work(subdomains, n, costs.node, living);
+    if costs.message > 0.0 { Shared::new(subdomains, n).add_messages(work, costs.message) } else { work }
+}
+
+/// The last finish.
+fn slowest(work: &[f64], speeds: &[f64]) -> f64 {
+    work.iter().zip(speeds).map(|(w, s)| w / s).fold(0.0, f64::max)
+}
+
+/// What workers share in structured parts.
+struct Shared {
+    /// By worker: others with which it shares nodes.
+    neighbours: Vec<u32>,
+    /// By worker: copies of its nodes that others hold.
+    nodes: Vec<f64>,
+}
+
+impl Shared {
+    fn new(subdomains: &[Subdomain], n: usize) -> Self {
+        let boxes: Vec<(usize, Cells, usize)> = subdomains
+            .iter()
+            .filter_map(|s| match s.region {
+                Region::Cells { low, high } => Some((s.part, Cells { low, high }, s.worker)),
+                Region::List(_) => None,
+            })
+            .collect();
+        let mut shared = Self { neighbours: vec![0; n], nodes: vec![0.0; n] };
+        let mut pairs = BTreeSet::new();
+        for (at, (part, cells, worker)) in boxes.iter().enumerate() {
+            for (other_part, other_cells, other) in &boxes[at + 1..] {
+                let nodes = cells.nodes_shared_with(other_cells);
+                if part == other_part && worker != other && nodes > 0.0 {
+                    pairs.insert((*worker.min(other), *worker.max(other)));
+                    shared.nodes[*worker] += nodes;
+                    shared.nodes[*other] += nodes;
+                }
+            }
+        }
+        for (one, other) in pairs {
+            shared.neighbours[one] += 1;
+            shared.neighbours[other] += 1;
+        }
+        shared
+    }
+
+    /// Adds what messages cost: two for each neighbour.
+    fn add_messages(&self, mut work: Vec<f64>, message: f64) -> Vec<f64> {
+        for (work, &neighbours) in work.iter_mut().zip(&self.neighbours) {
+            *work += 2.0 * message * f64::from(neighbours);
+        }
+        work
+    }
+
+    /// The longest that a host's wire is busy in one direction, with a force of three numbers by node.
+    fn on_a_wire(&self, byte: f64) -> f64 {
+        24.0 * byte * self.nodes.iter().copied().fold(0.0, f64::max)
+    }
 }
 
 /// The worker of every element, by global index.
@@ -214,7 +293,12 @@ fn grouping(speeds: &[f64], seed: u64) -> Vec<usize> {
     order
 }
 
-fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec<Subdomain> {
+fn cut_all(
+    mesh: &Mesh,
+    speeds: &[f64],
+    (order, axes): (&[usize], &[usize]),
+    living: &Living,
+) -> Vec<Subdomain> {
     let mut out = Vec::new();
     for (part, mesh_part) in mesh.parts.iter().enumerate() {
         let mut pieces = Vec::new();
@@ -224,7 +308,7 @@ fn cut_all(mesh: &Mesh, speeds: &[f64], order: &[usize], living: &Living) -> Vec
                 let shortest = (0..3).fold(2, |best, a| if cells[a] < cells[best] { a } else { best });
                 if all.volume() > 0 {
                     let count = |cells: &Cells| living.in_box(part, cells);
-                    cut_planes(vec![all], shortest, order, speeds, &count, &mut pieces);
+                    cut_planes(vec![all], (axes, shortest), order, speeds, &count, &mut pieces);
                 }
             }
             Topology::Explicit { .. }
@@ -264,11 +348,11 @@ fn fastest(workers: &[usize], speeds: &[f64]) -> usize {
 }
 
 /// Recursive bisection along index planes, of all boxes together. Where whole planes miss the share of the workers, the
-/// last plane is divided once more, so that the miss is at most half a column along the part's shortest axis. The axis
+/// last plane is divided once more, so that the miss is at most half a column along the part's shortest axis. Of `axes` it
 /// is that with the smaller interface.
 fn cut_planes(
     boxes: Vec<Cells>,
-    shortest: usize,
+    (axes, shortest): (&[usize], usize),
     workers: &[usize],
     speeds: &[f64],
     count: &dyn Fn(&Cells) -> u64,
@@ -284,7 +368,7 @@ fn cut_planes(
     let mut best: Option<(f64, Cut, usize)> = None;
     for split in [middle, workers.len() - middle] {
         let target = volume as f64 * total(&workers[..split], speeds) / total(workers, speeds);
-        for axis in AXES {
+        for &axis in axes {
             let Some(whole) = Cut::whole(&boxes, axis, target, count) else { continue };
             let interface = volume as f64 / whole.planes;
             let near = NEAR * target.min(volume as f64 - target);
@@ -319,13 +403,13 @@ fn cut_planes(
             }
         }
     }
-    cut_planes(below, shortest, &workers[..split], speeds, count, out);
-    cut_planes(above, shortest, &workers[split..], speeds, count, out);
+    cut_planes(below, (axes, shortest), &workers[..split], speeds, count, out);
+    cut_planes(above, (axes, shortest), &workers[split..], speeds, count, out);
 }
 
-/// Axes in the order in which equals are preferred: a lane set lies along I, so a cut across J has fewer of them at the
-/// border and leaves rows long.
-const AXES: [usize; 3] = [1, 0, 2];
+/// Sets of axes to cut along, in the order in which equals are preferred: a lane set lies along I, so a cut across J has fewer of them at
+/// the border and leaves rows long.
+const AXES: &[&[usize]] = &[&[1, 0, 2], &[1, 0], &[1, 2], &[0, 2], &[1], &[0], &[2]];
 
 /// How near to the share of the workers whole planes have to come, relative to the smaller side.
 const NEAR: f64 = 0.002;
@@ -342,6 +426,14 @@ struct Cells {
 impl Cells {
     fn volume(&self) -> u64 {
         (0..3).map(|a| u64::from(self.high[a] - self.low[a])).product()
+    }
+
+    /// How many nodes both have.
+    fn nodes_shared_with(&self, other: &Self) -> f64 {
+        let along = |a: usize| {
+            f64::from((self.high[a].min(other.high[a]) + 1).saturating_sub(self.low[a].max(other.low[a])))
+        };
+        (0..3).map(along).product()
     }
 
     /// What lies below index plane `plane` of an axis, and the rest.
@@ -444,127 +536,4 @@ fn bisect(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use mechanics::mesh::Part;
-
-    const NODE: f64 = 0.1;
-
-    fn plate(cells: [u32; 3]) -> Mesh {
-        let part = Part {
-            name: "plate".into(),
-            material: 0,
-            topology: Topology::Structured { cells },
-            nodes: Vec::new(),
-            element_ids: Vec::new(),
-            hourglass: Default::default(),
-        };
-        Mesh { positions: Vec::new(), node_ids: Vec::new(), parts: vec![part], lumped: Vec::new() }
-    }
-
-    fn shares(subdomains: &[Subdomain], n: usize) -> Vec<usize> {
-        let mut count = vec![0; n];
-        for s in subdomains {
-            count[s.worker] += s.region.n_elements();
-        }
-        count
-    }
-
-    #[test]
-    fn every_element_is_dealt_once() {
-        for n in [1, 2, 3, 4, 7, 16, 200] {
-            let speeds: Vec<f64> = (0..n).map(|i| 1.0 + (i % 4) as f64).collect();
-            let mesh = plate([30, 30, 10]);
-            let total: usize = shares(&decompose(&mesh, &speeds, NODE, None), n).iter().sum();
-            assert_eq!(total, 9000, "{n} workers");
-        }
-    }
-
-    #[test]
-    fn shares_follow_speeds_within_one_index_plane() {
-        let speeds = [1.0, 2.0, 0.5];
-        let count = shares(&decompose(&plate([30, 30, 20]), &speeds, NODE, None), 3);
-        for (c, s) in count.iter().zip(speeds) {
-            let ideal = 18_000.0 * s / 3.5;
-            assert!((*c as f64 - ideal).abs() <= 600.0, "{count:?}: {c} against {ideal}");
-        }
-    }
-
-    #[test]
-    fn equal_speeds_share_equally_where_planes_allow() {
-        assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16], NODE, None), 16), vec![1000; 16]);
-    }
-
-    /// Sixteen hosts with speeds of 1 to 4, by a small generator.
-    fn mixed_lab(seed: u64) -> Vec<f64> {
-        let mut state = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let speed = |_| {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (1 + (state >> 33) % 4) as f64
-        };
-        (0..16).map(speed).collect()
-    }
-
-    /// Slabs along the first axis in proportion to speeds, rounded to planes: what index planes alone give.
-    fn naive_slabs(cells: [u32; 3], speeds: &[f64]) -> f64 {
-        let all: f64 = speeds.iter().sum();
-        let (mut passed, mut from, mut worst) = (0.0, 0.0, 0.0_f64);
-        for speed in speeds {
-            passed += speed;
-            let to = (f64::from(cells[0]) * passed / all).round();
-            worst = worst.max((to - from) * f64::from(cells[1] * cells[2]) / speed);
-            from = to;
-        }
-        worst
-    }
-
-    #[test]
-    fn a_mixed_lab_ends_near_the_bound() {
-        for (n, goal) in [(30, 1.05), (40, 1.04), (100, 1.015)] {
-            let (mut worst, mut sum, mut naive) = (0.0_f64, 0.0, 0.0_f64);
-            for seed in 0..20 {
-                let speeds = mixed_lab(seed);
-                let bound = f64::from(n * n * n) / speeds.iter().sum::<f64>();
-                let ratio = slowest_finish(&decompose(&plate([n; 3]), &speeds, NODE, None), &speeds) / bound;
-                (worst, sum) = (worst.max(ratio), sum + ratio);
-                naive = naive.max(naive_slabs([n; 3], &speeds) / bound);
-            }
-            println!(
-                "{n}^3: time over the bound {:.4} mean, {worst:.4} worst; slabs {naive:.3} worst",
-                sum / 20.0
-            );
-            assert!(worst <= goal, "{n}^3: {worst} over the bound, at most {goal}");
-            assert!(worst < naive, "{n}^3: {worst} against slabs {naive}");
-        }
-    }
-
-    #[test]
-    fn facing_columns_of_thin_plates_fall_on_one_worker() {
-        let speeds = mixed_lab(3);
-        // Both plates in one problem, which has one grouping and one set of shares.
-        let thick = [4, 3];
-        let mut both = plate([40, 40, thick[0]]);
-        both.parts.extend(plate([40, 40, thick[1]]).parts);
-        let mut owners = [vec![usize::MAX; 1600], vec![usize::MAX; 1600]];
-        for s in decompose(&both, &speeds, NODE, None) {
-            let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
-            assert_eq!((low[2], high[2]), (0, thick[s.part]), "the thin axis stays whole");
-            for j in low[1]..high[1] {
-                for i in low[0]..high[0] {
-                    owners[s.part][(j * 40 + i) as usize] = s.worker;
-                }
-            }
-        }
-        assert!(owners[0] == owners[1], "columns of the two plates have different workers");
-    }
-
-    #[test]
-    fn cuts_leave_the_thin_axis_whole() {
-        for s in decompose(&plate([30, 30, 10]), &[1.0; 4], NODE, None) {
-            let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
-            assert_eq!((low[2], high[2]), (0, 10));
-        }
-    }
-}
+mod tests;

@@ -209,7 +209,8 @@ impl Deaths {
 const fn position(message: &ToMaster) -> Option<u64> {
     match message {
         ToMaster::Ready { .. } => Some(1),
-        ToMaster::Cycle { cycle, .. } => Some(cycle.saturating_add(2)),
+        ToMaster::Cycle { cycle, .. } | ToMaster::Votes { cycle, .. } => Some(cycle.saturating_add(2)),
+        ToMaster::At { position } => Some(*position),
         _ => None,
     }
 }
@@ -250,6 +251,14 @@ impl Driver {
             return Ok(());
         }
         let Some(waiting) = self.pace.waits_for(self.ends, self.now()) else { return Ok(()) };
+        if self.pace.asks() {
+            let at_work = self.job.at_work().iter().map(|&worker| (worker, &self.members[worker].link));
+            let asked = at_work.map(|(worker, link)| (worker, link.send(self.place, &ToWorker::Where)));
+            let lost = asked.filter_map(|(worker, sent)| sent.err().map(|error| (worker, error.to_string())));
+            let lost: Vec<_> = lost.collect();
+            self.lost.extend(lost);
+            return Ok(());
+        }
         let Waiting { worker, silence, longest, late } = waiting;
         let worker_link = &self.members[worker].link;
         let words = format!(
@@ -369,11 +378,21 @@ impl Driver {
                 }
             };
             let woken = matches!(input, Input::Wake);
+            let mut is_answer = false;
             match input {
                 Input::Message(worker, header, message) => match self.check(&header, &message) {
                     Ok(()) => {
                         if header.epoch == self.job.epoch() {
-                            self.pace.hear(worker, position(&message), self.now());
+                            match (&message, position(&message)) {
+                                (ToMaster::At { .. }, Some(position)) => {
+                                    is_answer = true;
+                                    self.pace.place(worker, position);
+                                }
+                                (ToMaster::Votes { .. }, Some(position)) => {
+                                    self.pace.hear_all(position, self.now());
+                                }
+                                (_, position) => self.pace.hear(worker, position, self.now()),
+                            }
                             if self.suspect == Some(worker) {
                                 self.suspect = None;
                                 sink.suspect(self.members[worker].link.incarnation, None);
@@ -412,7 +431,7 @@ impl Driver {
                     self.apply(Event::Suspend, sink)?;
                 }
             }
-            if !woken {
+            if !woken && !is_answer {
                 self.pace.touch(self.now());
             }
         }
@@ -424,7 +443,16 @@ impl Driver {
         if header.epoch > epoch {
             return Err(format!("frame of epoch {}, this is epoch {epoch}", header.epoch));
         }
-        if let ToMaster::Cycle { cycle, .. } = message
+        if let ToMaster::Votes { cycle, .. } = message
+            && header.epoch == epoch
+        {
+            if header.cycle != *cycle {
+                return Err(format!("votes of cycle {cycle} in a frame of cycle {}", header.cycle));
+            }
+            // The root may be a plan further when the last vote comes to it; the orders follow the plan that it says.
+            self.place.plan = header.plan;
+        }
+        if let ToMaster::Cycle { cycle, .. } | ToMaster::Gathered { cycle, .. } = message
             && header.epoch == epoch
         {
             let plan = self.job.plan_hash(*cycle);

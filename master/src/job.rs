@@ -6,10 +6,11 @@
 //! What it knows is in parts that know nothing of each other's insides, each tested by itself: `problem` is the same for the
 //! whole job; `workers`, `checkpoints`, `balancing`, the account (`verdict`) and the `tally` live as long as the job; an
 //! `epoch` has a `schedule`, `sorts`, frames of cycles (`frames`), `worker_states` and `samples`. Here they are brought
-//! together: this file takes events and completes cycles, `collect` what comes of states and samples, `deal` begins an epoch,
+//! together: this file takes events and completes cycles, `by_tree` those whose votes travel by a `tree`, `collect` what comes of states and samples, `deal` begins an epoch,
 //! `turnover` ends one.
 
 mod balancing;
+mod by_tree;
 mod checkpoints;
 mod collect;
 mod deal;
@@ -25,6 +26,7 @@ mod sorts;
 mod tally;
 #[cfg(test)]
 mod tests;
+mod tree;
 mod turnover;
 mod twice;
 mod verdict;
@@ -257,6 +259,9 @@ impl Job {
         actions: &mut Vec<Action>,
     ) -> Result<(), Error> {
         let n = self.epoch.n();
+        if self.is_early(&message) {
+            return self.hold(worker, message);
+        }
         match message {
             ToMaster::Ready { vote, lanes } => {
                 let all = self.epoch.inflow.ready(worker, vote)?;
@@ -267,6 +272,12 @@ impl Job {
                 self.epoch.meter.note(worker, busy);
                 self.arrived(worker, cycle, Frame { vote, partials, gathered }, actions)
             }
+            ToMaster::Votes { cycle, votes } => self.votes_arrived(worker, cycle, votes, actions),
+            ToMaster::Gathered { cycle, positions } => {
+                self.positions_arrived(worker, cycle, positions, actions)
+            }
+            // Whoever drives the session waits for it.
+            ToMaster::At { .. } => Ok(()),
             ToMaster::Relay { to, message } => {
                 let member = self.epoch.at_work.get(to as usize).copied();
                 let breach = Breach::Address { to, workers: n };
@@ -521,11 +532,19 @@ impl Job {
         self.account.move_walls(&self.problem, &vote, now.dt)?;
         let times = [next.time, next.time_after];
         let orders = self.orders_for(cycle + 1, next.dt, times, Some(&vote), actions);
-        let exchange = self.epoch.sorts.exchange_at(cycle)?;
-        self.epoch.send_all(actions, |worker| {
-            let totals = exchange.of_worker(worker, &frames.totals);
-            ToWorker::Totals { cycle, orders: orders.clone(), totals }
-        });
+        match self.epoch.root {
+            Some(root) => {
+                let message = ToWorker::Totals { cycle, orders, totals: Vec::new() };
+                actions.push(Action::Send(self.epoch.at_work[root], message));
+            }
+            None => {
+                let exchange = self.epoch.sorts.exchange_at(cycle)?;
+                self.epoch.send_all(actions, |worker| {
+                    let totals = exchange.of_worker(worker, &frames.totals);
+                    ToWorker::Totals { cycle, orders: orders.clone(), totals }
+                });
+            }
+        }
         self.retire(cycle);
         self.begin_sort(cycle, &frames.gathered, actions)?;
         let limit = next.limit;

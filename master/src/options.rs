@@ -28,6 +28,23 @@ pub struct SessionOptions {
     /// Samples of what elements come to are computed again here, at the first cycle of each epoch and where states are
     /// kept; a worker whose sample differs is dropped.
     pub replay: bool,
+    /// How votes and orders travel on route direct.
+    pub tree: VoteTree,
+}
+
+/// When votes and orders travel by a tree of workers, and which.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VoteTree {
+    /// Fewer workers exchange them with the master itself.
+    pub from: usize,
+    /// Most children of a worker that are its neighbours: it merges their votes.
+    pub neighbours: usize,
+}
+
+impl Default for VoteTree {
+    fn default() -> Self {
+        Self { from: 5, neighbours: 12 }
+    }
 }
 
 impl SessionOptions {
@@ -40,6 +57,12 @@ impl SessionOptions {
     /// How partial forces travel.
     pub fn route(&self) -> Route {
         self.asked.route.unwrap_or_default()
+    }
+
+    /// What work costs; how a part is cut changes the number of messages on route direct only.
+    pub fn costs(&self) -> Costs {
+        let message = if self.route() == Route::Direct { self.costs.message } else { 0.0 };
+        Costs { message, ..self.costs }
     }
 }
 

@@ -47,21 +47,24 @@ struct Place {
 pub struct Pace {
     n_elements: usize,
     places: Vec<Place>,
-    /// When the job had last done what it was told to do (s).
+    /// What all have sent at least.
+    everybody: u64,
+    /// When the job had last done what it was told to do (s), and the same when workers were last asked where they stand.
     touched: f64,
+    asked: f64,
     longest: f64,
 }
 
 impl Pace {
     /// Of a job that nobody computes yet.
     pub const fn new(n_elements: usize) -> Self {
-        Self { n_elements, places: Vec::new(), touched: 0.0, longest: 0.0 }
+        Self { n_elements, places: Vec::new(), everybody: 0, touched: 0.0, asked: 0.0, longest: 0.0 }
     }
 
     /// An epoch begins with these workers.
     pub fn begin(&mut self, at_work: &[usize], now: f64) {
         self.places = at_work.iter().map(|&worker| Place { worker, position: 0, heard: now }).collect();
-        self.touched = now;
+        (self.everybody, self.touched) = (0, now);
     }
 
     /// A worker has sent a message of the epoch; with the position that it has come to, if the message says so.
@@ -77,6 +80,31 @@ impl Pace {
         }
     }
 
+    /// All workers have sent a cycle.
+    pub fn hear_all(&mut self, position: u64, now: f64) {
+        self.longest = self.longest.max(now - self.touched);
+        if self.everybody < position {
+            self.everybody = position;
+            self.longest *= FADING;
+        }
+    }
+
+    /// A worker says where it stands, because it was asked.
+    pub fn place(&mut self, worker: usize, position: u64) {
+        if let Some(place) = self.places.iter_mut().find(|place| place.worker == worker) {
+            place.position = place.position.max(position);
+        }
+    }
+
+    /// Whether workers are to be asked where they stand before one is named: once in each silence, where votes of all come as one.
+    pub fn asks(&mut self) -> bool {
+        let asks = self.everybody > 0 && self.asked < self.touched;
+        if asks {
+            self.asked = self.touched;
+        }
+        asks
+    }
+
     /// The job has done what a message asked for; while it did, no worker could make itself heard.
     pub fn touch(&mut self, now: f64) {
         self.touched = now;
@@ -86,7 +114,7 @@ impl Pace {
     pub fn waits_for(&self, ends: bool, now: f64) -> Option<Waiting> {
         // Of equal positions, the worker that was heard first has been silent for longest.
         let least = self.least();
-        let behind = self.places.iter().filter(|place| place.position == least);
+        let behind = self.places.iter().filter(|place| place.position.max(self.everybody) == least);
         let behind = behind.min_by(|a, b| a.heard.total_cmp(&b.heard))?;
         let loading = if least < 2 { LOAD_SECONDS_PER_ELEMENT * self.n_elements as f64 } else { 0.0 };
         let limit = |seconds: f64, silences: f64| seconds.max(silences * self.longest) + loading;
@@ -98,7 +126,8 @@ impl Pace {
     }
 
     fn least(&self) -> u64 {
-        self.places.iter().map(|place| place.position).min().unwrap_or_default()
+        let least = self.places.iter().map(|place| place.position).min().unwrap_or_default();
+        least.max(self.everybody)
     }
 }
 

@@ -81,7 +81,7 @@ fn print_rows<T: Serialize>(rows: &[T]) -> Result<ExitCode, String> {
 }
 
 fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
-    let costs = Costs { node: cluster.node, pair: cluster.pair };
+    let costs = Costs { node: cluster.node, pair: cluster.pair, ..Costs::NONE };
     let rows = mixed::run(cluster.speeds.len(), &mixed::EDGES.map(|(edge, _)| edge), args.seeds, costs)?;
     if args.json {
         return print_rows(&rows);
@@ -207,6 +207,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         ),
         speeds: cluster.speeds.clone(),
         costs,
+        dealt_by: costs.relative(&cluster.network),
         network: cluster.network.clone(),
         changes: cluster.changes.clone(),
     };

@@ -13,7 +13,7 @@ use protocol::options::Route;
 use tracing::trace;
 
 use crate::{
-    balance::{self, Dealing},
+    balance::{self, Costs, Dealing},
     exchange::Exchange,
     node_owners::NodeOwners,
 };
@@ -27,7 +27,7 @@ pub struct Sorter {
     route: Route,
     dealing: Dealing,
     /// What a pair costs, in element-cycles.
-    pair: f64,
+    costs: Costs,
     /// By worker: surface node index of each gathered position.
     gather: Vec<Vec<u32>>,
 }
@@ -72,14 +72,14 @@ impl Sorter {
         speeds: Vec<f64>,
         route: Route,
         dealing: Dealing,
-        pair: f64,
+        costs: Costs,
         gather: &[Vec<u32>],
     ) -> Self {
         let gather = gather
             .iter()
             .map(|nodes| nodes.iter().filter_map(|&node| surface.node_index(node)).collect())
             .collect();
-        Self { surface, settings, exclusions, speeds, route, dealing, pair, gather }
+        Self { surface, settings, exclusions, speeds, route, dealing, costs, gather }
     }
 
     /// The same for another surface with the same nodes.
@@ -91,7 +91,7 @@ impl Sorter {
             speeds: self.speeds.clone(),
             route: self.route,
             dealing: self.dealing,
-            pair: self.pair,
+            costs: self.costs,
             gather: self.gather.clone(),
         }
     }
@@ -130,7 +130,7 @@ impl Sorter {
         let worker_of = match self.dealing {
             Dealing::Owners => {
                 let weights = contact::cull(&mut units, &self.surface, x, &self.settings, &self.exclusions);
-                balance::assign(&units, (&weights, self.pair), &self.speeds, &node_owners.work, &owner)
+                balance::assign(&units, (&weights, self.costs), &self.speeds, &node_owners.work, &owner)
             }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
         };

@@ -403,7 +403,7 @@ impl<S: Surroundings> World<S> {
         let n = job.at_work().len();
         let member = job.at_work().get(to as usize).ok_or(Error::NoNeighbour { host, to, n })?;
         let to = End::Host(members[*member]);
-        let packed = wire::pack_to_peer(message);
+        let packed = wire::pack_to_peer(message)?;
         let (bytes, body) = (packed.wire_bytes(), Body::ToPeer { position, plan, packed });
         let parcel = Parcel { from: End::Host(host), to, epoch, bytes, before_task, body };
         self.surroundings.post(&self.sessions, parcel)

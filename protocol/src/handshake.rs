@@ -30,7 +30,7 @@ use std::fmt;
 /// 14: votes foresee strikes on rigid walls, setups have parts that are rigid for a time.
 /// 15: relaxation has a rate.
 /// 16: shells of four points and membranes, thicknesses by shell, springs, cables, and pressures that move.
-pub const VERSION: u16 = 16;
+pub const VERSION: u16 = 17;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

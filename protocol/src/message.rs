@@ -5,6 +5,8 @@
 //! `Report` and `WorkerState` with `last`, then `Release`. On route direct `Peers` comes before `Assign`, and partial forces go
 //! from worker to worker as [`ToPeer`].
 //!
+//! Where votes travel by a [`Tree`] of the workers, only its root sends the master [`ToMaster::Votes`] and hears `Totals`.
+//!
 //! A job that is dealt out anew - a worker was lost, one joined, speeds turned out to be others - sends a further
 //! `Assign` of the next epoch, at any time; what the worker still does for the epoch before comes to nothing.
 //!
@@ -79,6 +81,9 @@ pub enum ToWorker {
         /// Those of its threads that are given to another connection, which its process opens; 0 for none.
         apart: u32,
     },
+    /// The job has heard nothing for long, and of a tree it hears only the votes of all: a worker that waits answers with
+    /// [`ToMaster::At`], one that computes or is stuck does not.
+    Where,
 }
 
 /// Who computes a job, for links between its workers. Its frame names the job and the epoch.
@@ -103,12 +108,108 @@ pub struct PeerWorker {
     pub incarnation: u32,
 }
 
-/// From one worker to another, on route direct: once per cycle to each neighbour of the plan.
+/// From one worker to another, on route direct. Of one kind there is one for each cycle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ToPeer {
     pub cycle: u64,
-    /// Partial forces of the nodes that both hold, three numbers each.
-    pub partials: Vec<f64>,
+    pub what: Said,
+}
+
+/// What one worker says to another in a cycle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Said {
+    /// To each neighbour of the plan.
+    Partials {
+        /// Partial forces of the nodes that both hold, three numbers each.
+        partials: Vec<f64>,
+        /// What goes up or down the [`Tree`] and would else be a frame of its own.
+        aboard: Option<Box<Aboard>>,
+    },
+    /// To the parent in the tree: the votes of the sender and of all below it.
+    Votes(BranchVote),
+    /// To a child in the tree: the orders that answer the cycle.
+    Orders(Orders),
+}
+
+/// The kinds of [`Said`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SaidKind {
+    Partials,
+    Votes,
+    Orders,
+}
+
+/// What partial forces carry along for the tree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Aboard {
+    /// To the parent, of a worker without children: its vote.
+    Vote(BranchVote),
+    /// To a child without children: the orders that answer the cycle before.
+    Orders(Orders),
+}
+
+/// The votes of some workers for the cycle before, as one; the order of merging is no matter.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BranchVote {
+    /// How many workers.
+    pub workers: u32,
+    /// None in the first cycle of an epoch.
+    pub vote: Option<Box<Vote>>,
+}
+
+impl BranchVote {
+    /// Joins the votes of other workers.
+    pub fn merge(&mut self, other: Self) {
+        self.workers = self.workers.saturating_add(other.workers);
+        match (&mut self.vote, other.vote) {
+            (Some(all), Some(vote)) => all.merge(&vote),
+            (all @ None, vote) => *all = vote,
+            (Some(_), None) => {}
+        }
+    }
+}
+
+impl Said {
+    /// Its kind.
+    pub const fn kind(&self) -> SaidKind {
+        match self {
+            Self::Partials { .. } => SaidKind::Partials,
+            Self::Votes(_) => SaidKind::Votes,
+            Self::Orders(_) => SaidKind::Orders,
+        }
+    }
+
+    /// Whether a worker in cycle `now` may hear this of `cycle`. Neighbours are at most a cycle apart. A vote is waited for by the
+    /// orders that both need two cycles later, and those go to workers that have sent theirs.
+    pub const fn is_near(&self, cycle: u64, now: u64) -> bool {
+        let ahead = cycle.wrapping_sub(now);
+        match self.kind() {
+            SaidKind::Partials => ahead <= 1,
+            SaidKind::Votes => ahead.wrapping_add(1) <= 3,
+            SaidKind::Orders => now.wrapping_sub(cycle) <= 1,
+        }
+    }
+
+    /// The votes in it.
+    pub fn into_votes(self) -> Option<BranchVote> {
+        match self {
+            Self::Votes(votes) => Some(votes),
+            Self::Partials { aboard, .. } => match *aboard? {
+                Aboard::Vote(votes) => Some(votes),
+                Aboard::Orders(_) => None,
+            },
+            Self::Orders(_) => None,
+        }
+    }
+}
+
+/// A worker's place in the tree by which votes go up to the master and orders come down from it, on route direct.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tree {
+    /// Whom it sends votes to; none for the master.
+    pub parent: Option<u32>,
+    /// Whose votes it waits for and whom it sends orders to; of each, whether it has no children itself.
+    pub children: Vec<(u32, bool)>,
 }
 
 /// All that a worker holds of a job.
@@ -142,6 +243,8 @@ pub struct Assign {
     pub ghost_state: Vec<f64>,
     /// Where the rigid bodies are and how they move: all of them, on every worker.
     pub bodies: Vec<rigid::State>,
+    /// How votes and orders travel; none where every worker exchanges them with the master itself.
+    pub tree: Option<Tree>,
 }
 
 /// What the next cycles do; the same on every worker.
@@ -201,6 +304,19 @@ pub enum ToMaster {
         /// How long this worker has worked on its tasks so far, by the clock of its host (ns): what `--balance
         /// measured` goes by. Whoever drives the session fills it in.
         busy: Work,
+    },
+    /// Once per cycle from the root of a tree: the votes of all workers, where in `Cycle` they are one worker's.
+    Votes { cycle: u64, votes: BranchVote },
+    /// From each worker of a tree where the cycle gathers.
+    Gathered {
+        cycle: u64,
+        /// Positions of owned surface nodes.
+        positions: Vec<f64>,
+    },
+    /// The answer to [`ToWorker::Where`].
+    At {
+        /// 0 without its domain, 1 when it is ready, `c + 2` when it has sent what others need of cycle `c`.
+        position: u64,
     },
     /// For another worker that this one has no link to (route direct). Passed on as it is.
     Relay {

@@ -66,6 +66,9 @@ pub struct Report {
     pub ns: [u64; 7],
     /// The last [`TRACED_CYCLES`] cycles, oldest first.
     pub spans: Vec<Span>,
+    /// The cycle that it is in, and how long it has worked on its tasks so far, by the clock of its host (ns).
+    pub cycle: u64,
+    pub busy_ns: u64,
     /// Bytes that this worker sent over its own links to others.
     pub peer_bytes: u64,
     /// Workers that it has exchanged with over a link of their own to the end.

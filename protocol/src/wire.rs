@@ -10,7 +10,7 @@ use crate::{
     Error, Result,
     codec::{self, MESSAGE_LIMIT},
     frame::{CHUNK, CHUNK_PREFIX, CONTROL_LIMIT, HEADER_LEN, Kind},
-    message::{Orders, ToMaster, ToPeer, ToWorker, Work},
+    message::{Aboard, BranchVote, Orders, Said, ToMaster, ToPeer, ToWorker, Work},
 };
 
 /// A message ready to be framed.
@@ -63,12 +63,23 @@ impl Packed {
 }
 
 #[derive(Serialize, Deserialize)]
-struct CycleHead {
+enum CycleHead {
+    Cycle { cycle: u64, vote: Option<Box<Vote>>, partials: u64, gathered: u64, busy: Work },
+    Votes { cycle: u64, votes: BranchVote },
+    Gathered { cycle: u64 },
+}
+
+#[derive(Serialize, Deserialize)]
+struct PeerHead {
     cycle: u64,
-    vote: Option<Box<Vote>>,
-    partials: u64,
-    gathered: u64,
-    busy: Work,
+    what: SaidHead,
+}
+
+#[derive(Serialize, Deserialize)]
+enum SaidHead {
+    Partials(Option<Box<Aboard>>),
+    Votes(BranchVote),
+    Orders(Orders),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -119,7 +130,7 @@ pub fn unpack_to_worker(kind: Kind, bytes: &[u8]) -> Result<ToWorker> {
 pub fn pack_to_master(message: &ToMaster) -> Result<Packed> {
     match message {
         ToMaster::Cycle { cycle, vote, partials, gathered, busy } => {
-            let head = codec::encode(&CycleHead {
+            let head = codec::encode(&CycleHead::Cycle {
                 cycle: *cycle,
                 vote: vote.clone(),
                 partials: partials.len() as u64,
@@ -127,6 +138,14 @@ pub fn pack_to_master(message: &ToMaster) -> Result<Packed> {
                 busy: *busy,
             })?;
             Ok(Packed { kind: Kind::Cycle, cycle: *cycle, bytes: with_arrays(&head, &[partials, gathered]) })
+        }
+        ToMaster::Votes { cycle, votes } => {
+            let head = codec::encode(&CycleHead::Votes { cycle: *cycle, votes: votes.clone() })?;
+            Ok(Packed { kind: Kind::Cycle, cycle: *cycle, bytes: with_arrays(&head, &[]) })
+        }
+        ToMaster::Gathered { cycle, positions } => {
+            let head = codec::encode(&CycleHead::Gathered { cycle: *cycle })?;
+            Ok(Packed { kind: Kind::Cycle, cycle: *cycle, bytes: with_arrays(&head, &[positions]) })
         }
         other => Ok(Packed { kind: Kind::Control, cycle: 0, bytes: codec::encode(other)? }),
     }
@@ -140,26 +159,23 @@ pub fn unpack_to_master(kind: Kind, bytes: &[u8]) -> Result<ToMaster> {
     match kind {
         Kind::Cycle => {
             let (head, arrays) = split_head(bytes)?;
-            let head: CycleHead = codec::decode(head, MESSAGE_LIMIT)?;
-            let mut partials = codec::f64s(arrays)?;
-            let (found, stated) = (partials.len() as u64, head.partials.saturating_add(head.gathered));
-            if found < stated {
-                return Err(Error::Truncated {
-                    what: "arrays of a cycle",
-                    found: 8 * found,
-                    needed: stated.saturating_mul(8),
-                });
+            let numbers = codec::f64s(arrays)?;
+            match codec::decode(head, MESSAGE_LIMIT)? {
+                CycleHead::Cycle { cycle, vote, partials, gathered, busy } => {
+                    require_numbers(&numbers, partials.saturating_add(gathered))?;
+                    let mut partials_first = numbers;
+                    let gathered = partials_first.split_off(partials as usize);
+                    Ok(ToMaster::Cycle { cycle, vote, partials: partials_first, gathered, busy })
+                }
+                CycleHead::Votes { cycle, votes } => {
+                    require_numbers(&numbers, 0)?;
+                    Ok(ToMaster::Votes { cycle, votes })
+                }
+                CycleHead::Gathered { cycle } => Ok(ToMaster::Gathered { cycle, positions: numbers }),
             }
-            if found > stated {
-                return Err(Error::Message(format!(
-                    "{found} numbers in a cycle frame, its head says {stated}"
-                )));
-            }
-            let gathered = partials.split_off(head.partials as usize);
-            Ok(ToMaster::Cycle { cycle: head.cycle, vote: head.vote, partials, gathered, busy: head.busy })
         }
         Kind::Control => match codec::decode(bytes, MESSAGE_LIMIT)? {
-            ToMaster::Cycle { .. } => {
+            ToMaster::Cycle { .. } | ToMaster::Votes { .. } | ToMaster::Gathered { .. } => {
                 Err(Error::Unexpected { found: kind, expected: "a cycle in a cycle frame" })
             }
             message => Ok(message),
@@ -168,10 +184,35 @@ pub fn unpack_to_master(kind: Kind, bytes: &[u8]) -> Result<ToMaster> {
     }
 }
 
-/// Packs a message to another worker: its cycle, then raw numbers.
-pub fn pack_to_peer(message: &ToPeer) -> Packed {
-    let bytes = with_arrays(&message.cycle.to_le_bytes(), &[&message.partials]);
-    Packed { kind: Kind::Cycle, cycle: message.cycle, bytes }
+/// Passes an array of as many numbers as its head states.
+fn require_numbers(numbers: &[f64], stated: u64) -> Result<()> {
+    let found = numbers.len() as u64;
+    if found < stated {
+        return Err(Error::Truncated {
+            what: "arrays of a cycle",
+            found: 8 * found,
+            needed: stated.saturating_mul(8),
+        });
+    }
+    if found > stated {
+        return Err(Error::Message(format!("{found} numbers in a cycle frame, its head says {stated}")));
+    }
+    Ok(())
+}
+
+/// Packs a message to another worker.
+///
+/// # Errors
+/// If it is longer than a message may be.
+pub fn pack_to_peer(message: &ToPeer) -> Result<Packed> {
+    let cycle = message.cycle;
+    let (what, numbers): (_, &[f64]) = match &message.what {
+        Said::Partials { partials, aboard } => (SaidHead::Partials(aboard.clone()), partials),
+        Said::Votes(votes) => (SaidHead::Votes(votes.clone()), &[]),
+        Said::Orders(orders) => (SaidHead::Orders(orders.clone()), &[]),
+    };
+    let head = codec::encode(&PeerHead { cycle, what })?;
+    Ok(Packed { kind: Kind::Cycle, cycle, bytes: with_arrays(&head, &[numbers]) })
 }
 
 /// Reads a message of another worker.
@@ -183,10 +224,17 @@ pub fn unpack_to_peer(kind: Kind, bytes: &[u8]) -> Result<ToPeer> {
         return Err(Error::Unexpected { found: kind, expected: "a cycle frame" });
     }
     let (head, arrays) = split_head(bytes)?;
-    let head = <[u8; 8]>::try_from(head).map_err(|_| {
-        Error::Message(format!("head of a peer's cycle has {} bytes, expected 8", head.len()))
-    })?;
-    Ok(ToPeer { cycle: u64::from_le_bytes(head), partials: codec::f64s(arrays)? })
+    let PeerHead { cycle, what } = codec::decode(head, MESSAGE_LIMIT)?;
+    let numbers = codec::f64s(arrays)?;
+    let what = match what {
+        SaidHead::Partials(aboard) => {
+            return Ok(ToPeer { cycle, what: Said::Partials { partials: numbers, aboard } });
+        }
+        SaidHead::Votes(votes) => Said::Votes(votes),
+        SaidHead::Orders(orders) => Said::Orders(orders),
+    };
+    require_numbers(&numbers, 0)?;
+    Ok(ToPeer { cycle, what })
 }
 
 fn with_arrays(head: &[u8], arrays: &[&[f64]]) -> Vec<u8> {

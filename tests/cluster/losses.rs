@@ -93,6 +93,22 @@ fn two_workers_killed_at_once_and_one_more_later_leave_the_same_bits() {
 }
 
 #[test]
+fn workers_whose_votes_travel_by_a_tree_are_killed_at_its_root_and_elsewhere() {
+    let names = ["a", "b", "c", "d", "e", "f", "g"];
+    let (mut cluster, mut waiting) = running(&names, &["--route", "direct"]);
+    wait_for_cycle(&cluster, 400);
+    // Of equal workers the last is the root.
+    cluster.kill_worker("g");
+    wait_for_cycle(&cluster, 1000);
+    cluster.kill_worker("a");
+    wait_for_cycle(&cluster, 1500);
+    // The next root; four are left, which vote without a tree.
+    cluster.kill_worker("f");
+    let summary = same_as_undisturbed(&cluster, &mut waiting);
+    assert_eq!((summary["losses"].as_array().map(Vec::len), &summary["workers"]), (Some(3), &4.into()));
+}
+
+#[test]
 fn a_worker_that_comes_while_a_job_runs_is_used_from_the_next_boundary() {
     let (mut cluster, mut waiting) = running(&["a"], &[]);
     cluster.worker("late", "3");

@@ -31,7 +31,10 @@ use master::{
     world::{End, Error, Letter, Parcel, PeerFrame, Sessions, Surroundings, World},
 };
 use mechanics::flip::Target;
-use protocol::message::{ToMaster, ToPeer, ToWorker};
+use protocol::{
+    message::{SaidKind, ToMaster, ToPeer, ToWorker},
+    wire,
+};
 use worker::{
     compute::Machine,
     peers::pairs::{Heard, Pairs},
@@ -563,16 +566,23 @@ impl Play {
         if !*alive || *epoch < session.epoch() || *epoch < pairs.0 {
             return Ok(());
         }
-        let known = session.plan_at(message.cycle);
-        if *epoch > session.epoch() || *epoch > pairs.0 || known.is_none() {
+        let which = (message.what.kind(), message.cycle);
+        // Votes and orders follow no plan.
+        let known = match which.0 {
+            SaidKind::Partials => session.plan_at(message.cycle),
+            SaidKind::Votes | SaidKind::Orders => *plan,
+        };
+        let is_early = which.0 == SaidKind::Partials && known.is_none();
+        if *epoch > session.epoch() || *epoch > pairs.0 || is_early {
             held.push(frame);
             return Ok(());
         }
         if plan.is_some() && *plan != known {
             return Err(format!("host {host}: cycle {} under another plan", message.cycle));
         }
-        let checksum = message.partials.iter().fold(7_u64, |sum, x| sum.rotate_left(5) ^ x.to_bits());
-        match pairs.1.hear(*from, message.cycle, (checksum ^ (checksum >> 32)) as u32) {
+        let packed = wire::pack_to_peer(message).map_err(|error| error.to_string())?;
+        let checksum = packed.bytes.iter().fold(7_u64, |sum, byte| sum.rotate_left(5) ^ u64::from(*byte));
+        match pairs.1.hear(*from, which, (checksum ^ (checksum >> 32)) as u32) {
             Heard::Fresh => Ok(self.world.hear(Letter::ToPeer(host, frame))?),
             Heard::Double => Ok(()),
             Heard::Differs => Err(format!("host {host}: two different frames of cycle {}", message.cycle)),

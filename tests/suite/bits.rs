@@ -17,7 +17,7 @@ use tests::{
 };
 
 use deck::Model;
-use protocol::options::JobOptions;
+use protocol::options::{JobOptions, Route};
 
 pub(crate) use compare::{
     asked, fingerprint, losing_a_worker_changes_no_bit, same_bits, same_bits_from_files,
@@ -101,6 +101,19 @@ fn free_slip_plates_of_27000_elements_have_the_same_bits_on_any_crew() {
     model.setup.control.end_cycle = 24;
     model.output.history_cycles = 1;
     same_bits(&model);
+}
+
+#[test]
+fn votes_of_64_and_200_workers_come_to_the_bits_of_one() {
+    let mut model = example("plates-free-slip");
+    model.setup.control.end_cycle = 24;
+    model.output.history_cycles = 1;
+    let one = fingerprint(&model, Workers::default());
+    for workers in [64, 200] {
+        let options = without_states(JobOptions { route: Some(Route::Direct), ..JobOptions::default() });
+        let at_work = Workers { options, ..Workers::of(workers) };
+        one.assert_equal(&fingerprint(&model, at_work), &format!("{workers} workers"));
+    }
 }
 
 #[test]

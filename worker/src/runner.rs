@@ -133,8 +133,11 @@ impl Runner {
                 if header.job != job_before {
                     self.stopwatch = Stopwatch::new();
                 }
-                let neighbours: Vec<u32> = assign.plan.neighbours.iter().map(|n| n.worker).collect();
-                self.links.want(neighbours);
+                let mut wanted: Vec<u32> = assign.plan.neighbours.iter().map(|n| n.worker).collect();
+                if let Some(tree) = &assign.tree {
+                    wanted.extend(tree.parent.iter().chain(tree.children.iter().map(|(child, _)| child)));
+                }
+                self.links.want(wanted);
                 self.apply(Event::Message(ToWorker::Assign(assign)))
             }
             ToWorker::Plan { gathered_at, acts_at, plan, hash } => {
@@ -204,18 +207,19 @@ impl Runner {
                     Action::Send(ready @ ToMaster::Ready { .. }) => self.ready = Some(ready),
                     Action::Send(message) => self.timed(|runner| {
                         let last = matches!(message, ToMaster::WorkerState { last: Some(_), .. });
-                        let due = runner.reported.elapsed() > REPORT_EVERY;
-                        if last || (due && matches!(message, ToMaster::Cycle { .. })) {
-                            runner.reported = Instant::now();
-                            let mut report = runner.stopwatch.report();
-                            runner.links.report(&mut report);
-                            report.slow = runner.share.words();
-                            runner.send(&ToMaster::Report(Box::new(report)))?;
+                        let of_cycle = matches!(message, ToMaster::Cycle { .. } | ToMaster::Votes { .. });
+                        if last || (of_cycle && runner.is_report_due()) {
+                            runner.report()?;
                         }
                         let worked = share(runner.busy, runner.machine.work());
                         runner.send(&message.stamped(worked))
                     })?,
-                    Action::SendPeer(to, message) => self.timed(|runner| runner.send_peer(to, message))?,
+                    Action::SendPeer(to, message) => self.timed(|runner| {
+                        if runner.is_report_due() {
+                            runner.report()?;
+                        }
+                        runner.send_peer(to, message)
+                    })?,
                     Action::Compute(task) => {
                         let (machine, compute, started) = (&mut self.machine, self.compute, Instant::now());
                         let cycle = self.session.cycle();
@@ -237,6 +241,21 @@ impl Runner {
             }
         }
         Ok(())
+    }
+
+    fn is_report_due(&self) -> bool {
+        self.reported.elapsed() > REPORT_EVERY
+    }
+
+    /// Tells the master how the time went.
+    fn report(&mut self) -> Result<()> {
+        self.reported = Instant::now();
+        let mut report = self.stopwatch.report();
+        self.links.report(&mut report);
+        report.slow = self.share.words();
+        report.cycle = self.session.cycle();
+        report.busy_ns = self.busy.as_nanos() as u64;
+        self.send(&ToMaster::Report(Box::new(report)))
     }
 
     fn timed(&mut self, work: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
@@ -310,7 +329,7 @@ impl Watch {
     /// A message goes out under the plan in force.
     fn said(&mut self, message: &ToMaster, plan: u64) -> Place {
         self.place.plan = plan;
-        if let ToMaster::Cycle { cycle, .. } = message {
+        if let ToMaster::Cycle { cycle, .. } | ToMaster::Votes { cycle, .. } = message {
             self.plans.push_back((*cycle, plan));
         }
         self.place

@@ -7,6 +7,7 @@
 
 mod event;
 mod totals;
+mod tree;
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -16,12 +17,13 @@ use mechanics::{
     vote::Vote,
 };
 use protocol::{
-    message::{Assign, Orders, ToMaster, ToPeer, ToWorker, WORKER_STATE_VERSION, Work},
+    message::{Assign, Orders, ToMaster, ToWorker, WORKER_STATE_VERSION},
     options::Route,
 };
 
 pub use event::{Action, Event, Outcome, Task};
-use totals::{all_finite, of_nodes};
+use totals::all_finite;
+use tree::Branch;
 
 /// Where a session stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +60,11 @@ enum Phase {
 /// Most cycles whose totals may wait here.
 const MAX_BUFFERED: usize = 2;
 
+/// The position of a worker that has sent what others need of a cycle, see [`ToMaster::At`].
+const fn position_after(cycle: u64) -> u64 {
+    cycle.saturating_add(2)
+}
+
 /// The state of a worker's part in one job.
 #[derive(Debug)]
 pub struct Session {
@@ -91,6 +98,8 @@ pub struct Session {
     partials: Vec<f64>,
     heard: BTreeMap<(u64, u32), Vec<f64>>,
     plan_hash: u64,
+    /// Where votes and orders travel by a tree.
+    branch: Option<Branch>,
     vote: Option<Box<Vote>>,
     resumed: bool,
     imaged: bool,
@@ -133,6 +142,7 @@ impl Session {
             partials: Vec::new(),
             heard: BTreeMap::new(),
             plan_hash: 0,
+            branch: None,
             vote: None,
             resumed: false,
             imaged: false,
@@ -153,6 +163,18 @@ impl Session {
     /// The epoch of the assignment in hand; every frame carries it.
     pub fn epoch(&self) -> u32 {
         self.epoch
+    }
+
+    /// How far it has come, as [`ToMaster::At`] counts it.
+    fn position(&self) -> u64 {
+        match self.phase {
+            Phase::Idle | Phase::Loading => 0,
+            Phase::Ready => 1,
+            Phase::Interior | Phase::AwaitTotals | Phase::Sampling | Phase::Integrating | Phase::Over => {
+                position_after(self.cycle)
+            }
+            _ => self.cycle + 1,
+        }
     }
 
     /// Hash of the plan in force; every frame of a cycle carries it.
@@ -253,12 +275,18 @@ impl Session {
                 self.neighbours.clone_from(&assign.plan.neighbours);
                 self.stride = assign.plan.stride();
                 self.plan_hash = assign.plan_hash;
+                let n_parts = assign.n_parts as usize;
+                self.branch = assign.tree.clone().map(|place| Branch::new(place, n_parts));
                 self.resumed = assign.cycle > 0;
                 if self.busy {
                     self.next = Some(assign);
                 } else {
                     self.load(assign, actions);
                 }
+                Ok(())
+            }
+            ToWorker::Where => {
+                actions.push(Action::Send(ToMaster::At { position: self.position() }));
                 Ok(())
             }
             _ if self.phase == Phase::Over || self.phase == Phase::Idle => Ok(()),
@@ -298,31 +326,13 @@ impl Session {
                         self.totals.len()
                     ));
                 }
-                self.orders.insert(orders.next, orders);
+                self.take_orders(cycle, orders, actions);
                 if !totals.is_empty() {
                     self.totals.push_back((cycle, totals));
                 }
                 self.resume_waiting(actions)
             }
         }
-    }
-
-    /// A neighbour may be a cycle ahead, and its first frame of a new plan may come before this worker has that plan.
-    fn hear_peer(&mut self, from: u32, message: ToPeer, actions: &mut Vec<Action>) -> Result<(), String> {
-        if matches!(self.phase, Phase::Idle | Phase::Over) {
-            return Ok(());
-        }
-        let ahead = message.cycle.wrapping_sub(self.cycle);
-        if ahead >= MAX_BUFFERED as u64 {
-            return Err(format!(
-                "worker {from} sends cycle {} while this worker is in cycle {}",
-                message.cycle, self.cycle
-            ));
-        }
-        if self.heard.insert((message.cycle, from), message.partials).is_some() {
-            return Err(format!("worker {from} sends cycle {} twice", message.cycle));
-        }
-        self.resume_waiting(actions)
     }
 
     fn resume_waiting(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
@@ -393,19 +403,7 @@ impl Session {
             }
             (Phase::Border, Outcome::Forces { partials, gathered }) => {
                 all_finite("partial force", &partials)?;
-                let vote = self.vote.take();
-                let (cycle, busy) = (self.cycle, Work::default());
-                if self.route == Route::Master {
-                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered, busy }));
-                } else {
-                    for neighbour in &self.neighbours {
-                        let partials = of_nodes(&partials, &neighbour.shared, self.stride)?;
-                        actions.push(Action::SendPeer(neighbour.worker, ToPeer { cycle, partials }));
-                    }
-                    self.partials = partials;
-                    let partials = Vec::new();
-                    actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered, busy }));
-                }
+                self.send_forces(partials, gathered, actions)?;
                 if std::mem::take(&mut self.whole) {
                     self.phase = Phase::AwaitTotals;
                     return self.try_integrate(actions);

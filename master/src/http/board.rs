@@ -130,9 +130,25 @@ struct Worker {
     busy: Option<Work>,
     /// Of the cycles on the way: what each took (ns).
     took: BTreeMap<u64, u64>,
+    /// Where votes travel by a tree: its last report, and what a cycle took since the one before (ns).
+    reported: Option<[u64; 2]>,
+    each_took: Option<f64>,
     load: f64,
     mark: Option<(Instant, u64)>,
     report: Option<Report>,
+}
+
+impl Worker {
+    /// It has been busy for so long.
+    fn look(&mut self, now: Instant, busy_ns: u64) {
+        let (since, ns) = *self.mark.get_or_insert((now, busy_ns));
+        let passed = now.duration_since(since);
+        if passed > LOAD_WINDOW / 2 {
+            let computed = busy_ns.saturating_sub(ns) as f64;
+            self.load = (computed / passed.as_nanos() as f64).clamp(0.0, 1.0);
+            self.mark = Some((now, busy_ns));
+        }
+    }
 }
 
 /// A kept surface.
@@ -155,6 +171,8 @@ pub struct JobView {
     rows: u64,
     workers: BTreeMap<String, Worker>,
     balance: Vec<(u64, f64)>,
+    /// Votes travel by a tree: workers' reports say what their cycles take.
+    by_tree: bool,
     skin: Skin,
     /// Planes of symmetry.
     mirrors: [bool; 3],
@@ -178,6 +196,7 @@ impl JobView {
             rows: 0,
             workers: BTreeMap::new(),
             balance: Vec::new(),
+            by_tree: false,
             skin: Skin::new(model),
             mirrors: model.output.mirrors,
             states: Vec::new(),
@@ -292,10 +311,17 @@ impl JobView {
     /// Looks at a message of a worker on its way to the job.
     pub fn heard(&mut self, host: &str, message: &ToMaster) {
         match message {
-            ToMaster::Cycle { cycle, busy, .. } => self.cycle(host, *cycle, *busy),
+            ToMaster::Cycle { cycle, busy, .. } => {
+                self.by_tree = false;
+                self.cycle(host, *cycle, *busy);
+            }
+            ToMaster::Votes { .. } => self.by_tree = true,
             ToMaster::Report(report) => {
                 let worker = self.workers.entry(host.to_owned()).or_default();
                 worker.report = Some(report.as_ref().clone());
+                if self.by_tree {
+                    self.reported(host, report.cycle, report.busy_ns);
+                }
             }
             _ => {}
         }
@@ -307,13 +333,7 @@ impl JobView {
         if let Some(before) = worker.busy.replace(busy) {
             worker.took.insert(cycle, busy.compute_ns.saturating_sub(before.compute_ns));
         }
-        let (since, ns) = *worker.mark.get_or_insert((now, busy.compute_ns));
-        let passed = now.duration_since(since);
-        if passed > LOAD_WINDOW / 2 {
-            let computed = busy.compute_ns.saturating_sub(ns) as f64;
-            worker.load = (computed / passed.as_nanos() as f64).clamp(0.0, 1.0);
-            worker.mark = Some((now, busy.compute_ns));
-        }
+        worker.look(now, busy.compute_ns);
         if self.workers.values().all(|worker| worker.took.contains_key(&cycle)) {
             let took = self.workers.values().map(|worker| worker.took[&cycle] as f64);
             let mean = took.clone().sum::<f64>() / self.workers.len() as f64;
@@ -321,15 +341,37 @@ impl JobView {
             for worker in self.workers.values_mut() {
                 worker.took.retain(|&at, _| at > cycle);
             }
-            if mean > 0.0 {
-                self.balance.push((cycle, most / mean));
-                let lately = &self.balance[self.balance.len().saturating_sub(32)..];
-                let sum: f64 = lately.iter().map(|(_, ratio)| ratio).sum();
-                self.brief.imbalance = Some(sum / lately.len() as f64);
-            }
-            if self.balance.len() > 2 * POINTS_LIMIT {
-                halve(&mut self.balance);
-            }
+            self.add_balance(cycle, most, mean);
+        }
+    }
+
+    /// A worker of a tree has been busy for so long by this cycle.
+    fn reported(&mut self, host: &str, cycle: u64, busy_ns: u64) {
+        let worker = self.workers.entry(host.to_owned()).or_default();
+        if let Some([before, ns]) = worker.reported.replace([cycle, busy_ns])
+            && cycle > before
+        {
+            worker.each_took = Some(busy_ns.saturating_sub(ns) as f64 / (cycle - before) as f64);
+        }
+        worker.look(Instant::now(), busy_ns);
+        if self.workers.values().all(|worker| worker.each_took.is_some()) {
+            let took = self.workers.values_mut().filter_map(|worker| worker.each_took.take());
+            let took: Vec<f64> = took.collect();
+            let most = took.iter().copied().fold(0.0, f64::max);
+            self.add_balance(cycle, most, took.iter().sum::<f64>() / took.len() as f64);
+        }
+    }
+
+    /// What the slowest took at a cycle, and all in the mean.
+    fn add_balance(&mut self, cycle: u64, most: f64, mean: f64) {
+        if mean > 0.0 {
+            self.balance.push((cycle, most / mean));
+            let lately = &self.balance[self.balance.len().saturating_sub(32)..];
+            let sum: f64 = lately.iter().map(|(_, ratio)| ratio).sum();
+            self.brief.imbalance = Some(sum / lately.len() as f64);
+        }
+        if self.balance.len() > 2 * POINTS_LIMIT {
+            halve(&mut self.balance);
         }
     }
 
@@ -432,5 +474,20 @@ mod tests {
         }
         assert_eq!(job_view.balance, [(2, 1.5), (3, 1.5)]);
         assert_eq!(job_view.brief.imbalance, Some(1.5));
+    }
+
+    #[test]
+    fn where_votes_travel_by_a_tree_reports_say_how_uneven_cycles_are() {
+        let mut job_view = job_view();
+        let deal = |name: &str| Deal { name: name.to_owned(), speed: 1.0, elements: 1 };
+        job_view.dealt(&[deal("a"), deal("b")]);
+        let report =
+            |cycle, busy_ns| ToMaster::Report(Box::new(Report { cycle, busy_ns, ..Report::default() }));
+        job_view.heard("a", &ToMaster::Votes { cycle: 1, votes: Default::default() });
+        for (second, cycles) in [(1, 10), (2, 20)] {
+            job_view.heard("a", &report(cycles, 100 * cycles));
+            job_view.heard("b", &report(cycles + second, 300 * (cycles + second)));
+        }
+        assert_eq!(job_view.balance, [(22, 1.5)]);
     }
 }

@@ -13,6 +13,7 @@ use mechanics::mesh::Mesh;
 use protocol::message::Work;
 
 use crate::{
+    balance::Costs,
     decompose::{Living, Subdomain, decompose, work},
     incident::Rebalance,
 };
@@ -78,8 +79,7 @@ pub(super) struct Shares {
 /// What work is dealt out over.
 pub(super) struct Ground<'a> {
     pub(super) mesh: &'a Mesh,
-    /// Cost of a node, in elements.
-    pub(super) node: f64,
+    pub(super) costs: Costs,
     /// Which elements are alive; none where nothing can erode.
     pub(super) alive: Option<&'a [bool]>,
 }
@@ -177,7 +177,7 @@ fn propose(medians: &[[f64; 2]], slowest: f64, shares: &Shares, ground: &Ground<
     if speeds == shares.speeds && held == shares.elements {
         return None;
     }
-    let layout = decompose(ground.mesh, &speeds, ground.node, ground.alive);
+    let layout = decompose(ground.mesh, &speeds, ground.costs, ground.alive);
     let elements = work(&layout, n, 0.0, &living);
     // Contact in elements, dealt out by speed.
     let truly: Vec<f64> = (0..n).map(|w| measured[w].unwrap_or(speeds[w] * usual)).collect();
@@ -204,7 +204,7 @@ mod tests {
     /// Two workers that were dealt `mesh` by equal speeds.
     fn shares(mesh: &Mesh) -> Shares {
         let speeds = vec![1.0, 1.0];
-        let layout = decompose(mesh, &speeds, 0.0, None);
+        let layout = decompose(mesh, &speeds, Costs::NONE, None);
         let elements = work(&layout, 2, 0.0, &Living::new(mesh, None));
         Shares { speeds, elements, layout }
     }
@@ -213,7 +213,7 @@ mod tests {
     fn a_worker_at_half_speed_is_given_half_of_the_work_of_the_other_and_told_so() {
         let mesh = bar();
         let shares = shares(&mesh);
-        let ground = Ground { mesh: &mesh, node: 0.0, alive: None };
+        let ground = Ground { mesh: &mesh, costs: Costs::NONE, alive: None };
         let mut balancing = Balancing::default();
         assert!(!balancing.look((20, 20), &[[100.0, 0.0], [103.0, 0.0]], &shares, &ground), "they agree");
         assert!(balancing.look((40, 20), &[[100.0, 0.0], [200.0, 0.0]], &shares, &ground));
@@ -228,7 +228,7 @@ mod tests {
     fn after_a_change_that_brought_nothing_the_next_waits_twice_as_long_each_time() {
         let mesh = bar();
         let shares = shares(&mesh);
-        let ground = Ground { mesh: &mesh, node: 0.0, alive: None };
+        let ground = Ground { mesh: &mesh, costs: Costs::NONE, alive: None };
         let mut balancing = Balancing::default();
         let slow = [[100.0, 0.0], [200.0, 0.0]];
         let mut changes = Vec::new();

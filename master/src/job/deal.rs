@@ -12,7 +12,10 @@ use mechanics::{
     state::GlobalState,
     vote::Watched,
 };
-use protocol::message::{Assign, ToWorker};
+use protocol::{
+    message::{Assign, ToWorker},
+    options::{Balance, Route},
+};
 use rayon::prelude::*;
 
 use super::{
@@ -25,13 +28,14 @@ use super::{
     problem::{Problem, Touching},
     samples::Samples,
     tally::Tally,
+    tree,
     twice::Twice,
     verdict::Account,
     workers::Workers,
 };
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
-    decompose::{self, Living, decompose, work},
+    decompose::{self, Living, decompose, held, work},
     event::{Action, Deal, WorkerSpec},
     exchange::Exchange,
     node_owners::NodeOwners,
@@ -107,6 +111,11 @@ impl Job {
         self.epoch.sorts.forget_state(&statics);
     }
 
+    /// Whether the master looks at the vote of each worker, so that nobody may merge them before.
+    fn votes_are_looked_at(&self) -> bool {
+        self.options.asked.verify > 0.0 || self.options.asked.balance == Balance::Measured
+    }
+
     /// Deals the newest checkpoint out to a set of workers, as epoch `number`.
     pub(super) fn deal(
         &mut self,
@@ -129,16 +138,16 @@ impl Job {
         let specs: Vec<&WorkerSpec> = at_work.iter().map(|&index| self.workers.spec(index)).collect();
         let speeds = self.twice.speeds(&at_work);
         let speeds: Vec<f64> = speeds.unwrap_or_else(|| specs.iter().map(|spec| spec.speed).collect());
-        let costs = self.options.costs;
+        let costs = self.options.costs();
         let alive = alive_in(state);
-        let layout = decompose(&model.mesh, &speeds, costs.node, alive.as_deref());
+        let layout = decompose(&model.mesh, &speeds, costs, alive.as_deref());
         if model.output.workers {
             let owners: Arc<[u32]> = decompose::owners(&model.mesh, &layout).into();
             actions.push(Action::Owners(Arc::clone(&owners)));
             epoch.owners = Some(owners);
         }
         let threads: Vec<u32> = specs.iter().map(|spec| spec.threads).collect();
-        let held = work(&layout, n, costs.node, &Living::new(&model.mesh, alive.as_deref()));
+        let held = held(&layout, n, costs, &Living::new(&model.mesh, alive.as_deref()));
         let n_bodies = model.setup.bodies.len() + checkpoint.continuation.formed.len();
         let dealt = (layout.as_slice(), held);
         let division = Division::new((model, n_bodies), state, dealt, &threads, problem.touching.as_ref());
@@ -159,7 +168,7 @@ impl Job {
                     speeds.clone(),
                     self.options.route(),
                     self.options.dealing,
-                    costs.pair,
+                    costs,
                     &division.gather,
                 );
                 let x = Gathered { cycle: state.cycle, x: sorter.positions_of(state) };
@@ -190,6 +199,13 @@ impl Job {
             sections: model.output.sections.iter().map(|section| section.cut.clone()).collect(),
             row_cycles: model.output.history_cycles,
         };
+        let is_one_for_all = self.options.route() == Route::Direct && !self.votes_are_looked_at();
+        let mut trees = Vec::new();
+        if is_one_for_all && n >= self.options.tree.from {
+            let cycle = elements.iter().sum::<f64>() / speeds.iter().sum::<f64>();
+            trees = tree::tree(&exchange.plans, &speeds, self.options.tree.neighbours, (cycle, costs));
+            epoch.root = trees.iter().position(|place| place.parent.is_none());
+        }
         for (position, subdomains) in division.by_worker.into_iter().enumerate() {
             let assign = Assign {
                 epoch: number,
@@ -207,6 +223,7 @@ impl Job {
                 plan_hash: exchange.hash,
                 ghost_state: exchange.ghost_state_from(position, state),
                 bodies: bodies.clone(),
+                tree: trees.get(position).cloned(),
             };
             actions.push(Action::Send(at_work[position], ToWorker::Assign(Box::new(assign))));
         }

@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use deck::model::Model;
-use protocol::message::ToWorker;
+use protocol::message::{ToMaster, ToWorker};
 
 use super::{
     balancing::{Meter, Shares},
@@ -31,12 +31,16 @@ pub(super) struct Epoch {
     pub(super) number: u32,
     /// Indices of the workers, by position; nobody while the job waits for a worker.
     pub(super) at_work: Vec<usize>,
+    /// The position of the worker that sends the votes of all, where they form a tree.
+    pub(super) root: Option<usize>,
     pub(super) shares: Shares,
     /// The worker of every element, where the deck wants states to say it.
     pub(super) owners: Option<Arc<[u32]>>,
     pub(super) schedule: Schedule,
     pub(super) sorts: Sorts,
     pub(super) inflow: Inflow,
+    /// States and samples, by the position of who sent them, that have overtaken votes on their way through the tree.
+    pub(super) early: Vec<(usize, ToMaster)>,
     pub(super) worker_states: WorkerStates,
     pub(super) samples: Samples,
     pub(super) meter: Meter,
@@ -48,11 +52,13 @@ impl Epoch {
         Self {
             number,
             at_work: Vec::new(),
+            root: None,
             shares: Shares::default(),
             owners: None,
             schedule: Schedule::new(checkpoint, model.output.period),
             sorts: Sorts::new(&checkpoint.state, checkpoint.continuation.spread_rate),
             inflow: Inflow::new(0, checkpoint.continuation.vote.clone()),
+            early: Vec::new(),
             worker_states: WorkerStates::default(),
             samples: Samples::default(),
             meter: Meter::new(0),

@@ -130,6 +130,12 @@ pub enum Breach {
     ReadyTwice,
     /// A cycle before all were ready.
     BeforeStart(u64),
+    /// The votes of all in a cycle, from a worker that is not the root of their tree.
+    NotTheRoot(u64),
+    /// The votes of so many workers in a cycle, where there are others.
+    Voters { cycle: u64, voters: u32, workers: usize },
+    /// States or samples again and again, before the votes of this cycle.
+    TooEarly(u64),
     /// The same thing of a cycle twice.
     Twice(Sent, u64),
     /// Something of a cycle that nobody asked for.
@@ -165,6 +171,7 @@ pub enum Breach {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sent {
     Frame,
+    Positions,
     WorkerState,
     Sample,
 }
@@ -269,9 +276,28 @@ impl Breach {
             ),
             Self::ReadyTwice => write!(f, "worker {worker} is ready twice"),
             Self::BeforeStart(cycle) => write!(f, "worker {worker} sends cycle {cycle} before the start"),
+            Self::TooEarly(cycle) => {
+                write!(
+                    f,
+                    "worker {worker} sends states and samples again and again before the votes of cycle {cycle}"
+                )
+            }
+            Self::NotTheRoot(cycle) => {
+                write!(
+                    f,
+                    "worker {worker} sends the votes of all in cycle {cycle}, which another one collects"
+                )
+            }
+            Self::Voters { cycle, voters, workers } => {
+                write!(
+                    f,
+                    "worker {worker} sends the votes of {voters} workers in cycle {cycle}, there are {workers}"
+                )
+            }
             Self::Twice(sent, cycle) => {
                 let what = match sent {
                     Sent::Frame => "",
+                    Sent::Positions => "positions of ",
                     Sent::WorkerState => "its image of ",
                     Sent::Sample => "its sample of ",
                 };
@@ -280,6 +306,7 @@ impl Breach {
             Self::Unasked(sent, cycle) => {
                 let what = match sent {
                     Sent::Frame => "a frame",
+                    Sent::Positions => "positions",
                     Sent::WorkerState => "an image",
                     Sent::Sample => "a sample",
                 };

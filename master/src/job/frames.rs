@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use mechanics::vote::Vote;
+use protocol::message::BranchVote;
 
 use super::error::{Breach, Error, Sent};
 use crate::exchange::Exchange;
@@ -25,6 +26,15 @@ pub(super) struct Frames {
     pub(super) gathered: Vec<Vec<f64>>,
 }
 
+/// One cycle where votes come from the root of a tree: what has come.
+#[derive(Default)]
+struct OfTree {
+    votes: Option<BranchVote>,
+    /// Positions of all workers are part of it; known once the votes have come.
+    gathers: bool,
+    gathered: BTreeMap<usize, Vec<f64>>,
+}
+
 /// All frames of one epoch.
 pub(super) struct Inflow {
     ready: Vec<bool>,
@@ -32,6 +42,8 @@ pub(super) struct Inflow {
     /// The vote of the cycle before the first.
     vote_before: Option<Vote>,
     cycles: BTreeMap<u64, Frames>,
+    /// Those of a tree.
+    of_tree: BTreeMap<u64, OfTree>,
     /// State of nodes that move between workers when a plan begins to act, by its cycle, then by worker.
     transfers: BTreeMap<u64, Vec<Option<Vec<f64>>>>,
 }
@@ -53,6 +65,7 @@ impl Inflow {
             running: false,
             vote_before,
             cycles: BTreeMap::new(),
+            of_tree: BTreeMap::new(),
             transfers: BTreeMap::new(),
         }
     }
@@ -125,6 +138,64 @@ impl Inflow {
         merge(&mut frames.vote, frame.vote);
         let whole = frames.arrived.iter().all(|arrived| *arrived);
         Ok(if whole { self.cycles.remove(&cycle) } else { None })
+    }
+
+    /// Adds the votes of all; where the cycle `gathers`, positions of all belong to it.
+    ///
+    /// # Errors
+    /// If they are not those of all, or have come before.
+    pub(super) fn add_votes(
+        &mut self,
+        worker: usize,
+        cycle: u64,
+        votes: BranchVote,
+        gathers: bool,
+    ) -> Result<(), Error> {
+        let (voters, workers) = (votes.workers, self.ready.len());
+        if voters as usize != workers {
+            return Err(Error::Worker(worker, Breach::Voters { cycle, voters, workers }));
+        }
+        let of_tree = self.of_tree.entry(cycle).or_default();
+        of_tree.gathers = gathers;
+        if of_tree.votes.replace(votes).is_some() {
+            return Err(Error::Worker(worker, Breach::Twice(Sent::Frame, cycle)));
+        }
+        Ok(())
+    }
+
+    /// Adds the positions of a worker's surface nodes.
+    ///
+    /// # Errors
+    /// If they have come before.
+    pub(super) fn add_gathered(
+        &mut self,
+        worker: usize,
+        cycle: u64,
+        positions: Vec<f64>,
+    ) -> Result<(), Error> {
+        let of_tree = self.of_tree.entry(cycle).or_default();
+        if of_tree.gathered.insert(worker, positions).is_some() {
+            return Err(Error::Worker(worker, Breach::Twice(Sent::Positions, cycle)));
+        }
+        Ok(())
+    }
+
+    /// All of the next cycle of a tree, once it is here. Votes come in the order of cycles, positions whenever they can.
+    pub(super) fn next_whole(&mut self) -> Option<(u64, Frames)> {
+        let n = self.ready.len();
+        let first = self.of_tree.first_entry()?;
+        let OfTree { votes, gathers, gathered } = first.get();
+        if votes.is_none() || (*gathers && gathered.len() < n) {
+            return None;
+        }
+        let (cycle, OfTree { votes, gathered, .. }) = first.remove_entry();
+        let frames = Frames {
+            arrived: Vec::new(),
+            vote: votes?.vote.map(|vote| *vote),
+            totals: Vec::new(),
+            gathered: gathered.into_values().collect(),
+        };
+        Some((cycle, frames))
     }
 
     /// Adds the state of nodes that leave a worker at a cycle; gives, once all are here, what each worker takes in.

@@ -173,6 +173,11 @@ impl Sorts {
         self.last_gather = cycle;
     }
 
+    /// Whether positions travel at the start of a cycle.
+    pub(super) fn gathers_at(&self, cycle: u64) -> bool {
+        self.under_way.iter().any(|sort| sort.gathered == cycle)
+    }
+
     /// What the sort of the positions of `cycle` works on, where they were gathered for one. The surface changes with a
     /// blocking one, for good.
     pub(super) fn basis_for(&mut self, model: &Model, cycle: u64) -> Option<Arc<SortBasis>> {

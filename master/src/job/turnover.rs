@@ -134,8 +134,8 @@ impl Job {
         }
         let Some(medians) = self.epoch.meter.medians() else { return false };
         let alive = self.epoch.sorts.eroded().map(crate::erosion::Eroded::alive);
-        let (model, node) = (&self.problem.model, self.options.costs.node);
-        let ground = Ground { mesh: &model.mesh, node, alive: alive.as_deref() };
+        let (model, costs) = (&self.problem.model, self.options.costs());
+        let ground = Ground { mesh: &model.mesh, costs, alive: alive.as_deref() };
         let interval = u64::from(model.setup.control.plan_interval);
         self.balancing.look((boundary, interval), &medians, &self.epoch.shares, &ground)
     }

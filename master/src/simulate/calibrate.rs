@@ -27,6 +27,7 @@ pub fn work(model: &Arc<Model>, cluster: &Cluster) -> Result<Work, String> {
         costs: Costs { element: 1.0, node: 0.0, pair: 0.0, search: 0.0, sort: 0.0 },
         network: cluster.network.clone(),
         changes: Vec::new(),
+        dealt_by: balance::Costs::NONE,
     };
     let (timeline, _) = virtual_clock::run(model, &one, Scheme::bolide(Route::Direct), None)?;
     Ok(timeline.work_per_cycle())

@@ -25,10 +25,16 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// What the master deals out work by: relative to an element.
-    pub fn relative(&self) -> balance::Costs {
+    /// What the master deals out work by, on this network: relative to an element.
+    pub fn relative(&self, network: &Network) -> balance::Costs {
         let of = |seconds: f64| if self.element > 0.0 { seconds / self.element } else { 0.0 };
-        balance::Costs { node: of(self.node), pair: of(self.pair) }
+        balance::Costs {
+            node: of(self.node),
+            pair: of(self.pair),
+            message: of(network.message),
+            travel: of(network.latency),
+            byte: of(8.0 / network.rate),
+        }
     }
 
     /// Contact, elements and integration of a task (s).
@@ -57,6 +63,8 @@ pub struct Machines {
     /// Costs of work.
     pub costs: Costs,
     pub network: Network,
+    /// What the master deals out work by.
+    pub dealt_by: balance::Costs,
     /// What happens to hosts, by cycle.
     pub changes: Vec<Change>,
 }

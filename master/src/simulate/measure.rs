@@ -79,6 +79,7 @@ pub fn once(model: &Arc<Model>, hosts: usize, lanes: Option<Width>) -> Result<Me
             byte: 0.0,
         },
         changes: Vec::new(),
+        dealt_by: crate::balance::Costs::NONE,
     };
     let run = |hosts: usize| {
         let scheme = Scheme { lanes, sort_every: Some(SORTS_EVERY), ..Scheme::bolide(Route::Direct) };

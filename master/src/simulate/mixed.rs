@@ -116,19 +116,19 @@ impl Sorted {
 
     /// What hosts of these speeds come to. `costs` in elements.
     pub fn row(&self, edge: u32, seed: u64, speeds: &[f64], costs: Costs) -> Row {
-        let Costs { node, pair } = costs;
+        let Costs { node, pair, .. } = costs;
         let mesh = &self.model.mesh;
-        let layout = decompose(mesh, speeds, node, None);
+        let layout = decompose(mesh, speeds, costs, None);
         let living = Living::new(mesh, None);
         let elements = elements_of(&layout, speeds.len());
         let owner = owners(mesh, &layout);
         let owner = |node: u32| owner[self.surface.nodes[node as usize] as usize] as usize;
         let held = work(&layout, speeds.len(), node, &living);
-        let chosen = balance::assign(&self.units, (&self.weights, pair), speeds, &held, &owner);
+        let chosen = balance::assign(&self.units, (&self.weights, costs), speeds, &held, &owner);
         let pairs = self.pairs(&chosen, speeds.len());
 
         let slabs = slabs(mesh, speeds);
-        let whole = decompose(mesh, &[1.0], node, None);
+        let whole = decompose(mesh, &[1.0], costs, None);
         let slab_owner = owners(mesh, &slabs);
         let slab_owner = |node: u32| slab_owner[self.surface.nodes[node as usize] as usize] as usize;
         let slab_chosen = balance::assign_to_owners(&self.units, speeds.len(), &slab_owner);
@@ -287,7 +287,9 @@ mod tests {
 
     #[test]
     fn a_mixed_lab_is_near_its_bound_with_contact_and_slabs_are_not() {
-        for row in run(16, &[30], 1, Costs { node: 0.1, pair: 1.0 }).expect("the plates have contact") {
+        for row in
+            run(16, &[30], 1, Costs { node: 0.1, pair: 1.0, ..Costs::NONE }).expect("the plates have contact")
+        {
             println!("{row:?}");
             if row.seed == 0 {
                 assert_eq!(row.elements_over_bound, 1.0, "the paper's cells divide evenly: {row:?}");

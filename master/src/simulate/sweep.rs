@@ -142,6 +142,7 @@ pub fn run(
                         costs,
                         network: Network { rate, ..part.network.clone() },
                         changes: part.changes.clone(),
+                        dealt_by: costs.relative(&part.network),
                     };
                     let (timeline, kept) =
                         virtual_clock::run(model, &machines, Scheme::bolide(route), tape.as_ref())?;

@@ -160,6 +160,9 @@ fn cells(
     };
     let mut tape = None;
     let mut out = Vec::new();
+    // One tape serves all readings, so work is dealt out alike.
+    let first = readings.first().copied().unwrap_or(1);
+    let dealt_by = calibrate::costs(cluster, works, f64::from(first)).relative(&part.network);
     for &k in readings {
         let factors: &[f64] = if name == "direct" && n > 1 { &[1.0, FACTORS[0], FACTORS[1]] } else { &[1.0] };
         for &factor in factors {
@@ -170,6 +173,7 @@ fn cells(
                 costs,
                 network: part.network.scaled(factor),
                 changes: part.changes.clone(),
+                dealt_by,
             };
             let (timeline, kept) = virtual_clock::run(model, &machines, scheme, tape.as_ref())?;
             tape = tape.or(kept);

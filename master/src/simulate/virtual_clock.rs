@@ -103,7 +103,7 @@ pub fn run(
         keep: if come_and_go { CheckpointEvery::Seconds(KEEP_SECONDS) } else { CheckpointEvery::Never },
         waits: come_and_go,
         dealing: scheme.dealing,
-        costs: machines.costs.relative(),
+        costs: machines.dealt_by,
         ..SessionOptions::default()
     };
     let (job, first) =

@@ -7,6 +7,7 @@ use std::{
 
 use deck::model::Model;
 use master::{
+    balance,
     deck_file::read_deck,
     embedded::{self, Sink},
     event::{Action, WorkerSpec},
@@ -55,7 +56,13 @@ fn machines(n: usize) -> Machines {
             byte: 0.0,
         },
         changes: Vec::new(),
+        dealt_by: balance::Costs::NONE,
     }
+}
+
+/// With a master that knows what work costs.
+fn dealt_by_its_costs(machines: Machines) -> Machines {
+    Machines { dealt_by: machines.costs.relative(&machines.network), ..machines }
 }
 
 fn run(model: &Arc<Model>, machines: &Machines, scheme: Scheme) -> Timeline {
@@ -208,8 +215,10 @@ fn every_cluster_file_and_route_gives_the_digest_of_a_plain_run() {
     for file in files {
         // More hosts than that cost the test time and show nothing new.
         let part = cluster(&format!("{file}.toml")).first(20);
+        let costs = Costs { element: 1e-6, node: 1e-7, pair: 1e-6, search: 1e-6, sort: 2e-6 };
         let hosts = Machines {
-            costs: Costs { element: 1e-6, node: 1e-7, pair: 1e-6, search: 1e-6, sort: 2e-6 },
+            costs,
+            dealt_by: costs.relative(&part.network),
             believed: part.speeds.clone(),
             speeds: part.speeds.clone(),
             network: part.network.clone(),
@@ -295,11 +304,23 @@ fn a_mixed_lab_computes_near_its_bound_contact_included() {
     let work = calibrate::work(&model, &lab).expect("the deck runs on one host");
     // Contact costs a few percent, as in the paper; sorts on a machine of their own.
     let costs = Costs { element: 1.0, pair: 0.16, ..Costs::default() };
-    let hosts = Machines { costs, speeds: lab.speeds.clone(), believed: lab.speeds.clone(), ..machines(16) };
+    let (speeds, believed) = (lab.speeds.clone(), lab.speeds.clone());
+    let hosts = dealt_by_its_costs(Machines { costs, speeds, believed, ..machines(16) });
     let seconds = run(&model, &hosts, Scheme::bolide(Route::Direct)).seconds_per_cycle();
     let bound = calibrate::seconds(&costs, &work) / lab.speeds.iter().sum::<f64>();
     println!("mixed lab, contact included: {:.4} of the bound", seconds / bound);
     assert!(seconds / bound <= 1.04, "{seconds} s per cycle, bound {bound}");
+}
+
+#[test]
+fn the_master_handles_two_messages_a_cycle_whatever_the_number_of_workers() {
+    let model = model("plates-joined.toml", 24);
+    let of_master = |n: usize| {
+        let timeline = run(&model, &machines(n), Scheme::bolide(Route::Direct));
+        timeline.spans.iter().filter(|span| span.master && (8..18).contains(&span.cycle)).count()
+    };
+    assert_eq!([5, 12, 24].map(of_master), [20; 3]);
+    assert_eq!(of_master(4), 80, "few workers speak to it themselves");
 }
 
 /// Eight hosts that compute and hardly talk, one of which changes its speed on the way.
@@ -309,7 +330,7 @@ fn eight(changes: Vec<Change>) -> Machines {
     eight.network.latency = 1e-4;
     eight.network.rate = 1e9;
     eight.changes = changes;
-    eight
+    dealt_by_its_costs(eight)
 }
 
 /// The mean time of a cycle between two cycles, over the shortest that speeds allow.

@@ -17,9 +17,14 @@ use crate::cluster::{Cluster, DEADLINE, Process, said, until};
 pub fn cases() -> Vec<Case> {
     let case = |name, run| Case { name, tries: 1, run };
     vec![
-        case("worker whose computing is stuck, its link alive", |scene, _| given_up(scene, "stick:120")),
+        case("worker whose computing is stuck, its link alive", |scene, _| {
+            given_up(scene, &["a", "b"], "stick:120")
+        }),
+        case("the same of seven, of whose votes the master hears the sum", |scene, _| {
+            given_up(scene, &["a", "b", "d", "e", "f", "g"], "stick:120")
+        }),
         case("worker that only sends signs of life from the start", |scene, _| {
-            given_up(scene, "stick-in-load:1")
+            given_up(scene, &["a", "b"], "stick-in-load:1")
         }),
         case("job cancelled while its only worker is stuck", |scene, _| {
             let running = stuck_alone(scene);
@@ -306,10 +311,9 @@ fn full(scene: &Scene, mut cluster: Cluster, disk: super::disks::Disk) -> Seen {
 }
 
 /// One of three workers sticks; the job comes to its end without it.
-fn given_up(scene: &Scene, fault: &str) -> Seen {
+fn given_up(scene: &Scene, others: &[&str], fault: &str) -> Seen {
     let mut cluster = scene.cluster(&[], None, &[]);
-    cluster.worker("a", "1");
-    cluster.worker("b", "1");
+    others.iter().for_each(|name| cluster.worker(name, "1"));
     cluster.worker_that_fails("c", fault);
     let running = scene.submit(cluster);
     running.cluster.master.wait_for("worker c is suspect: the job waits for it");

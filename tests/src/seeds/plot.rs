@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use deck::Model;
-use master::options::{CheckpointEvery, SessionOptions};
+use master::options::{CheckpointEvery, SessionOptions, VoteTree};
 use protocol::options::{JobOptions, Route};
 
 use super::{Draws, Flip, Played, Seen, play};
@@ -287,6 +287,10 @@ impl Stage {
         let sometimes = [0.0, 0.0, 0.5, 1.0][draws.below(4) as usize];
         let mut options = SessionOptions { keep, store, ..options(route) };
         options.asked.verify = if flips > 0 { 1.0 } else { sometimes };
+        // On route direct: votes to the master, by a tree of a hub and its neighbours, or by a deeper one.
+        options.tree =
+            [VoteTree::default(), VoteTree { from: 2, neighbours: 12 }, VoteTree { from: 2, neighbours: 0 }]
+                [draws.below(3) as usize];
         (Plot { snapshot_at, faults, ..Plot::quiet(workers) }, options)
     }
 

@@ -3,7 +3,7 @@
 use deck::Model;
 use master::{
     embedded::Fate,
-    options::{CheckpointEvery, SessionOptions},
+    options::{CheckpointEvery, SessionOptions, VoteTree},
     snapshot::file,
 };
 use mechanics::lanes::Width;
@@ -97,8 +97,10 @@ pub(crate) fn same_bits_from_files(model: &Model, cycles: &[u64]) {
 
 /// Compares `one`, a run on one worker, with runs on route direct.
 pub(crate) fn same_bits_on_route_direct(model: &Model, one: &Fingerprint) {
-    for workers in [2, 3, 5] {
+    let deep = VoteTree { from: 2, neighbours: 0 };
+    for (workers, tree) in [(2, VoteTree::default()), (3, deep), (5, VoteTree::default())] {
         let options = without_states(JobOptions { route: Some(Route::Direct), ..JobOptions::default() });
+        let options = SessionOptions { tree, ..options };
         one.assert_equal(&fingerprint(model, asked(workers, options)), &format!("{workers} workers, direct"));
     }
 }
@@ -115,7 +117,9 @@ pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
     let mut midway = 0;
     for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
         let options = without_states(JobOptions { route: Some(route), ..JobOptions::default() });
-        let options = SessionOptions { keep: CheckpointEvery::Cycles(10), ..options };
+        // On route direct also of a hub and its children, and of a chain of hubs.
+        let tree = VoteTree { from: [9, 2, 2, 2][seed / 2], neighbours: [12, 12, 0, 0][seed / 2] };
+        let options = SessionOptions { keep: CheckpointEvery::Cycles(10), tree, ..options };
         let at = arrivals * (seed as u64 + 4) / 12;
         let mut fate = |number: u64| (number == at).then_some(Fate::Lose(seed % 3));
         let solved = solve_through(model.clone(), asked(3, options), &mut fate)

@@ -3,6 +3,9 @@
 //! A vote of cycle `n` travels with the frame of cycle `n + 1` and takes effect a fixed lag later, on one
 //! worker as on sixteen. Nothing here depends on how elements and nodes were dealt to workers.
 
+mod numbers;
+
+pub use numbers::not_a_number;
 use serde::{Deserialize, Serialize};
 
 use crate::{

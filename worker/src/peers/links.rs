@@ -8,10 +8,10 @@ use std::sync::Arc;
 
 use protocol::{
     Error,
-    frame::{Frame, Header},
+    frame::{Frame, Header, Kind},
     handshake,
     link::Sender,
-    message::{Introduction, ToPeer},
+    message::{Introduction, SaidKind, ToPeer},
     phase::Report,
     wire,
 };
@@ -117,8 +117,7 @@ impl Links {
         let sent = match self.pairs.send(to, message) {
             Err(message) => return vec![message],
             Ok((link, message)) => {
-                let packed = wire::pack_to_peer(message);
-                let header = self.circle.as_ref().map(|circle| Header {
+                let header = self.circle.as_ref().ok_or(Error::Closed).map(|circle| Header {
                     job: circle.key.job,
                     epoch: circle.key.epoch,
                     incarnation: circle
@@ -126,11 +125,12 @@ impl Links {
                         .peer_workers
                         .get(circle.who.me as usize)
                         .map_or(0, |member| member.incarnation),
-                    cycle: packed.cycle,
+                    cycle: message.cycle,
                     plan,
-                    ..Header::new(packed.kind)
+                    ..Header::new(Kind::Cycle)
                 });
-                header.ok_or(Error::Closed).and_then(|header| link.send(Frame::new(header, packed.bytes)))
+                let packed = wire::pack_to_peer(message);
+                header.and_then(|header| link.send(Frame::new(header, packed?.bytes)))
             }
         };
         match sent {
@@ -196,10 +196,10 @@ impl Links {
         session: &Session,
     ) -> Result<Option<ToPeer>, Error> {
         let (cycle, now) = (message.cycle, session.cycle());
-        let plan = session.plan_at(cycle);
-        match self.pairs.hear(from, cycle, header.crc) {
-            Heard::Fresh if cycle.wrapping_sub(now) > 1 => {
-                self.pairs.forget(from, cycle);
+        let which = (message.what.kind(), cycle);
+        match self.pairs.hear(from, which, header.crc) {
+            Heard::Fresh if !message.what.is_near(cycle, now) => {
+                self.pairs.forget(from, which);
                 return Err(Error::Message(format!("cycle {cycle}, this worker is in cycle {now}")));
             }
             Heard::Fresh => {}
@@ -208,11 +208,16 @@ impl Links {
                 return Err(Error::Message(format!("cycle {cycle} a second time, with other numbers")));
             }
         }
+        // Votes and orders follow no plan.
+        let plan = match which.0 {
+            SaidKind::Partials => session.plan_at(cycle),
+            SaidKind::Votes | SaidKind::Orders => Some(header.plan),
+        };
         match plan {
             Some(plan) if plan == header.plan => Ok(Some(message)),
             Some(plan) => {
                 // It comes again from where plans agree.
-                self.pairs.forget(from, cycle);
+                self.pairs.forget(from, which);
                 Err(differs(cycle, header.plan, plan))
             }
             None => {
@@ -225,10 +230,12 @@ impl Links {
     /// A message that the master relayed; none if it came over the link already. What was said twice and differently
     /// is for the session to refuse.
     pub fn relayed(&mut self, from: u32, message: ToPeer) -> Option<ToPeer> {
-        let mut frame =
-            Frame::new(Header::new(protocol::frame::Kind::Cycle), wire::pack_to_peer(&message).bytes);
-        let sealed = frame.seal();
-        let heard = sealed.map(|()| self.pairs.hear(from, message.cycle, frame.header.crc));
+        let which = (message.what.kind(), message.cycle);
+        let checksum = wire::pack_to_peer(&message).and_then(|packed| {
+            let mut frame = Frame::new(Header::new(Kind::Cycle), packed.bytes);
+            frame.seal().map(|()| frame.header.crc)
+        });
+        let heard = checksum.map(|checksum| self.pairs.hear(from, which, checksum));
         (heard != Ok(Heard::Double)).then_some(message)
     }
 
@@ -242,7 +249,7 @@ impl Links {
                     steps.push(Step { heard: Some((from, message)), relay: None });
                 }
                 Some(plan) => {
-                    self.pairs.forget(from, message.cycle);
+                    self.pairs.forget(from, (message.what.kind(), message.cycle));
                     let relay = self.lose(from, &differs(message.cycle, theirs, plan));
                     steps.push(Step { heard: None, relay: Some((from, relay)) });
                 }

@@ -7,11 +7,11 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use protocol::message::ToPeer;
+use protocol::message::{SaidKind, ToPeer};
 
-/// Frames of one neighbour that may not have arrived.
+/// Frames of one kind to one worker that may not have arrived.
 const KEPT: usize = 2;
-/// Frames of one neighbour that are remembered: those that may come twice, and those after them.
+/// Frames of one kind from one worker that are remembered: those that may come twice, and those after them.
 const REMEMBERED: usize = 4;
 
 /// The way to one worker.
@@ -33,8 +33,8 @@ struct Pair<L> {
     /// A plan has named it a neighbour.
     wanted: bool,
     kept: VecDeque<ToPeer>,
-    /// Cycle and checksum.
-    heard: VecDeque<(u64, u32)>,
+    /// Kind, cycle and checksum.
+    heard: VecDeque<(SaidKind, u64, u32)>,
 }
 
 impl<L> Default for Pair<L> {
@@ -56,6 +56,15 @@ pub enum Heard {
 /// All pairs of one worker in one epoch of a job; `L` is a link's sending half.
 #[derive(Debug)]
 pub struct Pairs<L>(BTreeMap<u32, Pair<L>>);
+
+/// Drops the oldest of one kind where there are `most` already.
+fn make_room<T>(frames: &mut VecDeque<T>, most: usize, is_of_kind: impl Fn(&T) -> bool) {
+    if frames.iter().filter(|frame| is_of_kind(frame)).count() >= most
+        && let Some(oldest) = frames.iter().position(is_of_kind)
+    {
+        frames.remove(oldest);
+    }
+}
 
 impl<L> Default for Pairs<L> {
     fn default() -> Self {
@@ -113,9 +122,8 @@ impl<L> Pairs<L> {
     pub fn send(&mut self, other: u32, message: ToPeer) -> Result<(&L, &ToPeer), ToPeer> {
         let pair = self.0.entry(other).or_default();
         let Way::Link(link) = &pair.way else { return Err(message) };
-        if pair.kept.len() >= KEPT {
-            pair.kept.pop_front();
-        }
+        let kind = message.what.kind();
+        make_room(&mut pair.kept, KEPT, |kept| kept.what.kind() == kind);
         pair.kept.push_back(message);
         match pair.kept.back() {
             Some(message) => Ok((link, message)),
@@ -124,24 +132,22 @@ impl<L> Pairs<L> {
     }
 
     /// A frame came, either way.
-    pub fn hear(&mut self, from: u32, cycle: u64, checksum: u32) -> Heard {
+    pub fn hear(&mut self, from: u32, (kind, cycle): (SaidKind, u64), checksum: u32) -> Heard {
         let heard = &mut self.0.entry(from).or_default().heard;
-        match heard.iter().find(|(known, _)| *known == cycle) {
-            Some((_, known)) if *known == checksum => Heard::Double,
+        match heard.iter().find(|(k, c, _)| (*k, *c) == (kind, cycle)) {
+            Some((.., known)) if *known == checksum => Heard::Double,
             Some(_) => Heard::Differs,
             None => {
-                if heard.len() >= REMEMBERED {
-                    heard.pop_front();
-                }
-                heard.push_back((cycle, checksum));
+                make_room(heard, REMEMBERED, |(known, ..)| *known == kind);
+                heard.push_back((kind, cycle, checksum));
                 Heard::Fresh
             }
         }
     }
 
     /// A frame that came was not taken after all: the same may come again.
-    pub fn forget(&mut self, from: u32, cycle: u64) {
-        self.0.entry(from).or_default().heard.retain(|(known, _)| *known != cycle);
+    pub fn forget(&mut self, from: u32, (kind, cycle): (SaidKind, u64)) {
+        self.0.entry(from).or_default().heard.retain(|(k, c, _)| (*k, *c) != (kind, cycle));
     }
 
     /// Neighbours with a link, then those without.
@@ -165,9 +171,12 @@ impl<L> Pairs<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol::message::{BranchVote, Said};
+
+    const PARTIALS: SaidKind = SaidKind::Partials;
 
     fn message(cycle: u64) -> ToPeer {
-        ToPeer { cycle, partials: vec![cycle as f64; 3] }
+        ToPeer { cycle, what: Said::Partials { partials: vec![cycle as f64; 3], aboard: None } }
     }
 
     /// Sends as a worker does; true for the link, false for the relay.
@@ -191,16 +200,32 @@ mod tests {
     fn doubles_are_known_by_cycle_and_bits() {
         let mut pairs = Pairs::<()>::default();
         for cycle in 10..20 {
-            assert_eq!(pairs.hear(2, cycle, cycle as u32), Heard::Fresh);
+            assert_eq!(pairs.hear(2, (PARTIALS, cycle), cycle as u32), Heard::Fresh);
             assert_eq!(
-                pairs.hear(2, cycle - 1, cycle as u32 - 1),
+                pairs.hear(2, (PARTIALS, cycle - 1), cycle as u32 - 1),
                 if cycle > 10 { Heard::Double } else { Heard::Fresh }
             );
         }
-        assert_eq!(pairs.hear(2, 19, 7), Heard::Differs);
-        pairs.forget(2, 19);
-        assert_eq!(pairs.hear(2, 19, 7), Heard::Fresh);
-        assert_eq!(pairs.hear(3, 19, 7), Heard::Fresh, "another worker's");
+        assert_eq!(pairs.hear(2, (PARTIALS, 19), 7), Heard::Differs);
+        pairs.forget(2, (PARTIALS, 19));
+        assert_eq!(pairs.hear(2, (PARTIALS, 19), 7), Heard::Fresh);
+        assert_eq!(pairs.hear(3, (PARTIALS, 19), 7), Heard::Fresh, "another worker's");
+    }
+
+    #[test]
+    fn votes_and_partial_forces_of_one_cycle_are_kept_and_known_apart() {
+        let mut pairs = Pairs::default();
+        assert_eq!(pairs.stands(4, "link"), Ok(()));
+        let votes = |cycle| ToPeer { cycle, what: Said::Votes(BranchVote::default()) };
+        for cycle in 1..4 {
+            assert!(send(&mut pairs, cycle) && pairs.send(4, votes(cycle)).is_ok());
+        }
+        let kept = vec![message(2), votes(2), message(3), votes(3)];
+        assert_eq!(pairs.lose(4), Some((kept, Some("link"))));
+        assert_eq!(pairs.hear(4, (PARTIALS, 3), 1), Heard::Fresh);
+        assert_eq!(pairs.hear(4, (SaidKind::Votes, 3), 2), Heard::Fresh);
+        assert_eq!(pairs.hear(4, (SaidKind::Orders, 3), 2), Heard::Fresh);
+        assert_eq!(pairs.hear(4, (SaidKind::Votes, 3), 2), Heard::Double);
     }
 
     #[test]

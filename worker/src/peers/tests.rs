@@ -6,7 +6,7 @@ use protocol::{
     dial::{self, Call},
     frame::Frame,
     handshake::{Hello, Membership, Role},
-    message::PeerWorker,
+    message::{PeerWorker, Said},
 };
 use tokio::{net::TcpSocket, time::timeout};
 
@@ -96,7 +96,8 @@ async fn join(low: &mut Side, high: &mut Side) {
 }
 
 fn message(cycle: u64, n: usize) -> ToPeer {
-    ToPeer { cycle, partials: (0..n).map(|i| i as f64 + cycle as f64).collect() }
+    let partials = (0..n).map(|i| i as f64 + cycle as f64).collect();
+    ToPeer { cycle, what: Said::Partials { partials, aboard: None } }
 }
 
 #[tokio::test]
@@ -119,7 +120,7 @@ async fn frames_pass_both_ways_and_what_may_be_lost_is_relayed_once() {
     assert_eq!(step.relay, Some((1, vec![message(0, 30), message(1, 30)])));
     assert_eq!(high.step().await.relay, Some((0, vec![message(0, 30), message(1, 30)])));
     assert_eq!(high.links.relayed(0, message(1, 30)), None, "it came over the link");
-    let other = ToPeer { cycle: 1, partials: vec![0.0; 90] };
+    let other = ToPeer { cycle: 1, what: Said::Partials { partials: vec![0.0; 90], aboard: None } };
     assert_eq!(high.links.relayed(0, other.clone()), Some(other), "for the session to refuse");
     assert_eq!(high.links.relayed(0, message(2, 30)), Some(message(2, 30)), "new");
     assert_eq!(low.links.send(1, message(2, 30), 0), [message(2, 30)]);
@@ -204,7 +205,7 @@ async fn frames_that_say_what_they_may_not_end_their_link_by_name() {
         let Call { sender, mut receiver, .. } = call(&low, |_| {}).await.expect("one of the job");
         assert_eq!(low.step().await, links::Step::default());
         assert_eq!(low.links.send(1, message(0, 3), 0), []);
-        let payload = wire::pack_to_peer(&message(0, 3)).bytes;
+        let payload = wire::pack_to_peer(&message(0, 3)).expect("short").bytes;
         sender.send(Frame::new(header, payload)).expect("queued");
         let news = low.next().await;
         if let What::Ended(error) = &news.what {

@@ -6,6 +6,7 @@ use mechanics::{
     exact::Quanta,
     setup::{Control, Setup},
 };
+use protocol::message::{Aboard, BranchVote, Said, ToPeer, Tree, Work};
 
 fn assign(cycle: u64) -> Box<Assign> {
     let quantum = Quantum::for_reference(1.0, 42);
@@ -48,6 +49,7 @@ fn assign(cycle: u64) -> Box<Assign> {
         plan_hash: 7,
         ghost_state: Vec::new(),
         bodies: Vec::new(),
+        tree: None,
     })
 }
 
@@ -260,4 +262,137 @@ fn stop_sends_the_image_with_the_last_vote() {
     assert!(matches!(actions[..], [Action::Compute(Task::WorkerState { last: true })]));
     let actions = done(&mut session, Outcome::WorkerState { pieces: Vec::new(), work: Work::default() });
     assert!(matches!(actions[..], [Action::Send(ToMaster::WorkerState { cycle: 1, last: Some(_), .. })]));
+}
+
+/// A session on route direct in cycle 0, whose border is done next; worker 1 is its neighbour.
+fn in_tree(tree: Tree) -> Session {
+    let mut session = Session::new();
+    let neighbours = vec![Neighbour { worker: 1, shared: vec![0] }];
+    let plan = Plan { exchange: vec![4], neighbours, ..Plan::default() };
+    let assign = Box::new(Assign { route: Route::Direct, plan, tree: Some(tree), ..*assign(0) });
+    hear(&mut session, ToWorker::Assign(assign));
+    done(&mut session, Outcome::Loaded { vote: None, lanes: "scalar".into() });
+    hear(&mut session, ToWorker::Start { orders: [orders(u64::MAX), orders(0)] });
+    session
+}
+
+fn votes(workers: u32) -> BranchVote {
+    BranchVote { workers, vote: None }
+}
+
+fn said(cycle: u64, what: Said) -> ToPeer {
+    ToPeer { cycle, what }
+}
+
+fn partials(aboard: Option<Aboard>) -> Said {
+    Said::Partials { partials: vec![1.0; 3], aboard: aboard.map(Box::new) }
+}
+
+#[test]
+fn a_leaf_votes_aboard_its_forces_and_hears_orders_aboard_its_parents() {
+    let mut session = in_tree(Tree { parent: Some(1), children: Vec::new() });
+    let sent = done(&mut session, forces());
+    let [Action::SendPeer(1, first), Action::Compute(_)] = &sent[..] else { panic!("{sent:?}") };
+    let Said::Partials { aboard: Some(aboard), .. } = &first.what else { panic!("{first:?}") };
+    assert_eq!(**aboard, Aboard::Vote(votes(1)));
+    done(&mut session, Outcome::Computed);
+    session.apply(Event::Peer(1, said(0, partials(None))));
+    done(&mut session, vote());
+    done(&mut session, forces());
+    done(&mut session, Outcome::Computed);
+    let aboard = partials(Some(Aboard::Orders(orders(1))));
+    let integrates = session.apply(Event::Peer(1, said(1, aboard)));
+    assert!(matches!(integrates[..], [Action::Compute(Task::Integrate { .. })]), "{integrates:?}");
+}
+
+#[test]
+fn a_hub_sends_its_branch_up_once_all_have_voted_and_passes_orders_on() {
+    let children = vec![(1, true), (2, false), (3, true)];
+    let mut session = in_tree(Tree { parent: Some(9), children });
+    // A child may be ahead.
+    session.apply(Event::Peer(2, said(0, Said::Votes(votes(5)))));
+    session.apply(Event::Peer(3, said(0, Said::Votes(votes(1)))));
+    let sent = done(&mut session, forces());
+    assert!(matches!(sent[..], [Action::SendPeer(1, _), Action::Compute(_)]), "{sent:?}");
+    let up = session.apply(Event::Peer(1, said(0, partials(Some(Aboard::Vote(votes(1)))))));
+    let [Action::SendPeer(9, up)] = &up[..] else { panic!("{up:?}") };
+    assert_eq!(*up, said(0, Said::Votes(votes(8))));
+    // To the neighbour without children they go with the next forces, to the others at once.
+    let down = session.apply(Event::Peer(9, said(0, Said::Orders(orders(1)))));
+    let at_once = Said::Orders(orders(1));
+    assert!(
+        matches!(&down[..], [Action::SendPeer(2, two), Action::SendPeer(3, three)]
+            if *two == said(0, at_once.clone()) && *three == *two),
+        "{down:?}"
+    );
+    done(&mut session, Outcome::Computed);
+    done(&mut session, vote());
+    let sent = done(&mut session, forces());
+    let [Action::SendPeer(1, first), Action::Compute(_)] = &sent[..] else { panic!("{sent:?}") };
+    let Said::Partials { aboard: Some(aboard), .. } = &first.what else { panic!("{first:?}") };
+    assert_eq!(**aboard, Aboard::Orders(orders(1)));
+}
+
+#[test]
+fn a_vote_that_nobody_waits_for_or_that_is_no_number_goes_no_further() {
+    let mut session = in_tree(Tree { parent: Some(9), children: vec![(2, true)] });
+    let wrong = session.apply(Event::Peer(3, said(0, Said::Votes(votes(1)))));
+    assert!(
+        matches!(&wrong[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("worker 3 votes")),
+        "{wrong:?}"
+    );
+    let mut session = in_tree(Tree { parent: Some(9), children: vec![(2, true)] });
+    let early = session.apply(Event::Peer(2, said(3, Said::Votes(votes(1)))));
+    assert!(matches!(&early[..], [Action::Send(ToMaster::Failed { .. })]), "{early:?}");
+    let mut session = in_tree(Tree { parent: Some(1), children: Vec::new() });
+    done(&mut session, forces());
+    done(&mut session, Outcome::Computed);
+    session.apply(Event::Peer(1, said(0, partials(None))));
+    let blown = Vote { contact: f64::NAN, ..Vote::empty(1) };
+    done(&mut session, Outcome::Integrated(Box::new(blown)));
+    let failed = done(&mut session, forces());
+    assert!(
+        matches!(&failed[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("NaN")),
+        "{failed:?}"
+    );
+}
+
+#[test]
+fn the_root_hears_orders_from_the_master_and_a_worker_says_where_it_stands() {
+    let mut session = in_tree(Tree { parent: None, children: vec![(2, true)] });
+    let at = |session: &mut Session| match hear(session, ToWorker::Where)[..] {
+        [Action::Send(ToMaster::At { position })] => position,
+        ref other => panic!("{other:?}"),
+    };
+    assert_eq!(at(&mut session), 1);
+    done(&mut session, forces());
+    assert_eq!(at(&mut session), 2);
+    let up = session.apply(Event::Peer(2, said(0, Said::Votes(votes(1)))));
+    assert!(
+        matches!(&up[..], [Action::Send(ToMaster::Votes { cycle: 0, votes })] if votes.workers == 2),
+        "{up:?}"
+    );
+    let totals = ToWorker::Totals { cycle: 0, orders: orders(1), totals: Vec::new() };
+    let down = hear(&mut session, totals);
+    assert!(matches!(down[..], [Action::SendPeer(2, _)]), "no neighbour: at once; {down:?}");
+}
+
+#[test]
+fn a_hub_at_its_end_still_merges_the_votes_of_those_that_are_behind() {
+    let mut session = in_tree(Tree { parent: Some(9), children: vec![(2, true)] });
+    done(&mut session, forces());
+    done(&mut session, Outcome::Computed);
+    session.apply(Event::Peer(9, said(0, Said::Orders(Orders { stop: true, ..orders(1) }))));
+    session.apply(Event::Peer(1, said(0, partials(None))));
+    done(&mut session, vote());
+    done(&mut session, forces());
+    done(&mut session, Outcome::Computed);
+    session.apply(Event::Peer(1, said(1, partials(None))));
+    done(&mut session, vote());
+    let last = done(&mut session, Outcome::WorkerState { pieces: Vec::new(), work: Work::default() });
+    assert!(matches!(&last[..], [Action::Send(ToMaster::WorkerState { last: Some(_), .. })]), "{last:?}");
+    for cycle in [0, 1] {
+        let up = session.apply(Event::Peer(2, said(cycle, Said::Votes(votes(1)))));
+        assert!(matches!(&up[..], [Action::SendPeer(9, up)] if up.cycle == cycle), "{up:?}");
+    }
 }

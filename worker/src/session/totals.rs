@@ -1,8 +1,92 @@
-//! Partial forces that leave a worker, and the totals that come back.
+//! What leaves a worker in a cycle and what comes back: partial forces and totals, votes and orders.
 
-use super::Session;
+use protocol::{
+    message::{Aboard, Orders, Said, ToMaster, ToPeer, Work},
+    options::Route,
+};
+
+use super::{Action, Phase, Session};
 
 impl Session {
+    /// Partial forces go to whom this worker shares nodes with, and the vote of the cycle before with them.
+    pub(super) fn send_forces(
+        &mut self,
+        partials: Vec<f64>,
+        gathered: Vec<f64>,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), String> {
+        let vote = self.vote.take();
+        let (cycle, busy) = (self.cycle, Work::default());
+        if self.route == Route::Master {
+            actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered, busy }));
+            return Ok(());
+        }
+        let mut frames = Vec::with_capacity(self.neighbours.len());
+        for neighbour in &self.neighbours {
+            frames.push((neighbour.worker, of_nodes(&partials, &neighbour.shared, self.stride)?));
+        }
+        self.partials = partials;
+        if self.branch.is_some() {
+            self.send_by_tree(vote, frames, actions)?;
+            if self.flags()?.gather {
+                actions.push(Action::Send(ToMaster::Gathered { cycle, positions: gathered }));
+            }
+            return Ok(());
+        }
+        for (to, partials) in frames {
+            let what = Said::Partials { partials, aboard: None };
+            actions.push(Action::SendPeer(to, ToPeer { cycle, what }));
+        }
+        let partials = Vec::new();
+        actions.push(Action::Send(ToMaster::Cycle { cycle, vote, partials, gathered, busy }));
+        Ok(())
+    }
+
+    /// A neighbour may be a cycle ahead, and its first frame of a new plan may come before this worker has that plan.
+    pub(super) fn hear_peer(
+        &mut self,
+        from: u32,
+        message: ToPeer,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), String> {
+        let cycle = message.cycle;
+        match (self.phase, message.what) {
+            (Phase::Idle, _) => return Ok(()),
+            // Who has come to the end still merges the votes of those that have not.
+            (Phase::Over, what) => {
+                if let Some(votes) = what.into_votes() {
+                    let _ = self.add_vote(cycle, Some(from), votes, actions);
+                }
+                return Ok(());
+            }
+            (_, what) if !what.is_near(cycle, self.cycle) => {
+                return Err(format!(
+                    "worker {from} sends cycle {cycle} while this worker is in cycle {}",
+                    self.cycle
+                ));
+            }
+            (_, Said::Partials { partials, aboard }) => {
+                if self.heard.insert((cycle, from), partials).is_some() {
+                    return Err(format!("worker {from} sends cycle {cycle} twice"));
+                }
+                match aboard.map(|aboard| *aboard) {
+                    Some(Aboard::Vote(votes)) => self.add_vote(cycle, Some(from), votes, actions)?,
+                    Some(Aboard::Orders(orders)) => self.take_orders(cycle.wrapping_sub(1), orders, actions),
+                    None => {}
+                }
+            }
+            (_, Said::Votes(votes)) => self.add_vote(cycle, Some(from), votes, actions)?,
+            (_, Said::Orders(orders)) => self.take_orders(cycle, orders, actions),
+        }
+        self.resume_waiting(actions)
+    }
+
+    /// The orders that answer a cycle have come.
+    pub(super) fn take_orders(&mut self, answered: u64, orders: Orders, actions: &mut Vec<Action>) {
+        self.pass_on(answered, &orders, actions);
+        self.orders.insert(orders.next, orders);
+    }
+
     /// The totals of this cycle from the master, if they are here.
     pub(super) fn totals_of_master(&mut self) -> Result<Option<Vec<f64>>, String> {
         match self.totals.front() {
@@ -52,7 +136,7 @@ pub(super) fn all_finite(what: &str, values: &[f64]) -> Result<(), String> {
 }
 
 /// The numbers, `stride` each, of these nodes.
-pub(super) fn of_nodes(values: &[f64], nodes: &[u32], stride: usize) -> Result<Vec<f64>, String> {
+fn of_nodes(values: &[f64], nodes: &[u32], stride: usize) -> Result<Vec<f64>, String> {
     let mut out = Vec::with_capacity(stride * nodes.len());
     for &node in nodes {
         let at = stride * node as usize;
