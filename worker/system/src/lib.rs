@@ -17,19 +17,22 @@
 //! | [`private`] | files that are their owner's alone |
 //! | [`processors`] | which processors threads may use, and how urgent a thread is |
 //! | [`service`] | programs that the service manager of Windows starts |
+//! | [`shared`] | memory that two processes have in common |
 //! | [`terminal`] | keys one by one, and the size of the screen |
 
 use std::path::PathBuf;
 
 #[cfg(any(windows, test))]
 mod command_line;
+#[cfg(not(target_os = "linux"))]
+mod unshared;
 
 #[cfg(unix)]
 mod unix;
 #[cfg(unix)]
 pub use unix::{
     allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, owner, private,
-    processors, service, terminal,
+    processors, service, shared, terminal,
 };
 
 #[cfg(windows)]
@@ -37,7 +40,7 @@ mod windows;
 #[cfg(windows)]
 pub use windows::{
     allocator, callers, children, clock, files, folders, host, interrupts, memory, notice, owner, private,
-    processors, service, terminal,
+    processors, service, shared, terminal,
 };
 
 /// A program that is to start with the machine, as its service manager keeps it.

@@ -14,4 +14,9 @@ pub mod owner;
 pub mod private;
 pub mod processors;
 pub mod service;
+#[cfg(target_os = "linux")]
+pub mod shared;
 pub mod terminal;
+
+#[cfg(not(target_os = "linux"))]
+pub use crate::unshared as shared;

@@ -17,3 +17,5 @@ pub mod processors;
 mod registry;
 pub mod service;
 pub mod terminal;
+
+pub use crate::unshared as shared;
