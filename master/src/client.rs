@@ -83,7 +83,7 @@ impl Client {
             .map_err(|e| format!("threads of the link: {e}"))?;
         let hello = Hello::new(Role::Client, host_name(), 1.0, 1, "none", worker::random());
         let call = runtime.block_on(dial::dial(&at.master, certificates.as_ref(), &hello));
-        let Call { sender, receiver, welcome } = call.map_err(|e| e.to_string())?;
+        let Call { sender, receiver, welcome, .. } = call.map_err(|e| e.to_string())?;
         Ok(Self {
             runtime,
             outbox: Outbox::new(sender, welcome.incarnation),

@@ -382,6 +382,9 @@ pub struct MasterArgs {
     /// Without certificates serve every user of this PC, not only its own and root
     #[arg(long, conflicts_with = "certs")]
     pub share: bool,
+    /// Stay on TCP with workers of this PC too
+    #[arg(long)]
+    pub no_shared_memory: bool,
 }
 
 /// A number of days, gigabytes, seconds or processors.
@@ -448,6 +451,9 @@ pub struct WorkerArgs {
     /// Make no connections to other workers: everything passes through the master
     #[arg(long, conflicts_with_all = ["peer_port", "peer_announce"])]
     pub no_peers: bool,
+    /// Stay on TCP with processes of this PC too
+    #[arg(long)]
+    pub no_shared_memory: bool,
     /// Its owner comes first: while somebody types or logs in, other programs take processors, or the PC is hot or on battery, work
     /// only this part of the time; 0 leaves the job to others [default: 0 if the flag is given]
     #[arg(long, value_name = "SHARE", num_args = 0..=1, require_equals = true, default_missing_value = "0", value_parser = share)]
@@ -537,6 +543,9 @@ pub struct MessagesArgs {
     /// Rounds per size, of which the median is printed
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub rounds: u32,
+    /// Stay on TCP between processes of this PC too
+    #[arg(long)]
+    pub no_shared_memory: bool,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

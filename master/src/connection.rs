@@ -18,6 +18,7 @@ use protocol::{
     frame::Frame,
     handshake::{Hello, Policy, Role, Server, Welcome},
     link::{self, MISSED_HEARTBEATS, Receiver, Sender, Settings},
+    memory::Near,
     message::ToMaster,
     order::{BULK_ON_THE_WAY, Inbox, Outbox},
     shape::{Shape, Shaped},
@@ -71,6 +72,8 @@ pub struct Acceptor {
     dead_after: Duration,
     /// Without certificates, callers of any user of this PC are taken in.
     shared: bool,
+    /// Links within this machine may go on over memory; never through an emulated port.
+    share_memory: bool,
     /// The last incarnation that was given.
     incarnations: AtomicU32,
     ending: AtomicBool,
@@ -97,6 +100,7 @@ impl Acceptor {
             port,
             dead_after,
             shared,
+            share_memory: true,
             incarnations,
             ending,
         }
@@ -120,6 +124,13 @@ impl Acceptor {
     #[must_use]
     pub fn shared(mut self, shared: bool) -> Self {
         self.shared = shared;
+        self
+    }
+
+    /// Whether links within this machine may go on over memory, as they do if nothing is said.
+    #[must_use]
+    pub fn sharing_memory(mut self, share_memory: bool) -> Self {
+        self.share_memory = share_memory;
         self
     }
 
@@ -180,6 +191,7 @@ impl Acceptor {
             ))
         };
         let place = place.map_err(|_| full())?.ok_or_else(full)?;
+        let near = if self.share_memory && self.port.is_none() { Near::of(&socket) } else { None };
         let stream = Shaped::new(socket, self.port.as_ref());
         match self.tls.clone() {
             None => {
@@ -195,7 +207,8 @@ impl Acceptor {
                 let refusal = refusal.map(|refusal| refusal.to_string());
                 let policy = Policy { roles: self.roles.clone(), refusal, ..Policy::default() };
                 let (sender, receiver) = link::split(stream, self.settings());
-                self.greet(sender, receiver, Caller { address, certificate: None }, policy, Some(place)).await
+                let caller = Caller { address, certificate: None };
+                self.greet((sender, receiver), near, caller, policy, Some(place)).await
             }
             Some(config) => {
                 let (stream, identity) = tls::accept_any(stream, &config).await?;
@@ -212,8 +225,8 @@ impl Acceptor {
                         self.ca_folder.as_ref().map(|(_, revoked)| revoked.clone()),
                     );
                 }
-                self.greet(sender, receiver, Caller { address, certificate: shown }, policy, Some(place))
-                    .await
+                let caller = Caller { address, certificate: shown };
+                self.greet((sender, receiver), near, caller, policy, Some(place)).await
             }
         }
     }
@@ -247,15 +260,15 @@ impl Acceptor {
     where
         S: AsyncRead + AsyncWrite + Send + 'static,
     {
-        let (sender, receiver) = link::split(stream, self.settings());
+        let link = link::split(stream, self.settings());
         let policy = Policy { roles: self.roles.clone(), certificate, ..Policy::default() };
-        self.greet(sender, receiver, Caller { address, certificate: None }, policy, None).await
+        self.greet(link, None, Caller { address, certificate: None }, policy, None).await
     }
 
     async fn greet(
         self: Arc<Self>,
-        sender: Sender,
-        mut receiver: Receiver,
+        (sender, mut receiver): (Sender, Receiver),
+        near: Option<Near>,
         caller: Caller,
         policy: Policy,
         place: Option<Place>,
@@ -267,9 +280,9 @@ impl Acceptor {
         let incarnation = self.incarnations.fetch_add(1, Ordering::Relaxed) + 1;
         if hello.role == Role::Worker {
             drop(place);
-            return self.worker(server, &hello, sender, receiver, caller, incarnation).await;
+            return self.worker(server, &hello, (sender, receiver), near, caller, incarnation).await;
         }
-        let welcome = Welcome { incarnation, host: 0, heartbeat_ms: self.heartbeat_ms() };
+        let welcome = Welcome::new(incarnation, 0, self.heartbeat_ms());
         link::admit(server, &sender, &mut receiver, welcome)?;
         if newcomer {
             let (ca_folder, _) =
@@ -294,8 +307,8 @@ impl Acceptor {
         &self,
         mut server: Server,
         hello: &Hello,
-        sender: Sender,
-        mut receiver: Receiver,
+        (sender, mut receiver): (Sender, Receiver),
+        near: Option<Near>,
         Caller { address, certificate }: Caller,
         incarnation: u32,
     ) -> Result<()> {
@@ -315,10 +328,11 @@ impl Acceptor {
             }
         };
         let delivery = Arc::new(Delivery::default());
-        let welcome = Welcome { incarnation, host, heartbeat_ms: self.heartbeat_ms() };
-        let error = match link::admit(server, &sender, &mut receiver, welcome) {
+        let welcome = Welcome::new(incarnation, host, self.heartbeat_ms());
+        let admitted = link::admit_near(server, &sender, &mut receiver, welcome, hello, near).await;
+        let error = match admitted {
             Err(error) => error,
-            Ok(()) => {
+            Ok(_) => {
                 let worker_link = WorkerLink {
                     spec: WorkerSpec { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
                     address: address.clone(),

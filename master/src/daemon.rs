@@ -67,6 +67,7 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
                 .behind(port)
                 .of(ca_folder)
                 .shared(args.share)
+                .sharing_memory(!args.no_shared_memory)
                 .patient_for(dead_after),
         );
         tokio::spawn(listen(listener, Arc::clone(&acceptor)));

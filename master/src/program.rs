@@ -158,6 +158,7 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
         } else {
             Listen::Port { port: args.peer_port, announce: args.peer_announce }
         },
+        share_memory: !args.no_shared_memory,
         compute,
         rules: Rules {
             share: args.yield_to_owner,

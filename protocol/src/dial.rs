@@ -14,6 +14,7 @@ use crate::{
     Error, Result,
     handshake::{self, Hello, Welcome},
     link::{self, Receiver, Sender, Settings},
+    memory::Near,
     shape::{Shape, Shaped},
     tls,
 };
@@ -33,6 +34,8 @@ pub struct Call {
     pub receiver: Receiver,
     /// The place that the master gave.
     pub welcome: Welcome,
+    /// Whether it is over memory, within this machine.
+    pub shares_memory: bool,
 }
 
 /// The configuration for dialling with the certificates in a folder; none without a folder.
@@ -52,6 +55,7 @@ pub struct Reached {
     roles: &'static [tls::Role],
     settings: Settings,
     port: Option<Shape>,
+    may_share: bool,
 }
 
 impl Reached {
@@ -59,6 +63,13 @@ impl Reached {
     #[must_use]
     pub fn through(mut self, port: Option<&Shape>) -> Self {
         self.port = port.cloned();
+        self
+    }
+
+    /// The same, which may go on over memory if the other side is on this machine; not through an emulated port.
+    #[must_use]
+    pub const fn sharing_memory(mut self, may_share: bool) -> Self {
+        self.may_share = may_share;
         self
     }
 
@@ -76,6 +87,8 @@ impl Reached {
     /// # Errors
     /// [`Error::Certificate`], or what [`link::greet`] gives.
     pub async fn greet(self, hello: &Hello) -> Result<Call> {
+        let may_share = self.may_share && self.port.is_none();
+        let near = if may_share { Near::of(&self.stream) } else { None };
         let stream = Shaped::new(self.stream, self.port.as_ref());
         let (sender, receiver) = match &self.certificates {
             None => link::split(stream, self.settings),
@@ -86,7 +99,7 @@ impl Reached {
                 (sender, receiver)
             }
         };
-        greet(sender, receiver, hello).await
+        greet_near(sender, receiver, hello, near).await
     }
 }
 
@@ -115,7 +128,8 @@ pub async fn reach_peer(
     let stream = connect(&[address], &address.to_string()).await?;
     let roles = &[tls::Role::Worker, tls::Role::Master];
     let host = address.ip().to_string();
-    Ok(Reached { stream, host, certificates: certificates.cloned(), roles, settings, port: None })
+    let certificates = certificates.cloned();
+    Ok(Reached { stream, host, certificates, roles, settings, port: None, may_share: false })
 }
 
 /// Connects to `master` as [`dial`] does, without a greeting.
@@ -136,6 +150,7 @@ pub async fn reach(master: &str, certificates: Option<&Arc<ClientConfig>>) -> Re
         roles: &[tls::Role::Master],
         settings: Settings::default(),
         port: None,
+        may_share: false,
     })
 }
 
@@ -155,9 +170,18 @@ async fn connect(addresses: &[SocketAddr], name: &str) -> Result<link::Socket> {
 ///
 /// # Errors
 /// What [`link::greet`] gives.
-pub async fn greet(sender: Sender, mut receiver: Receiver, hello: &Hello) -> Result<Call> {
-    let welcome = link::greet(&sender, &mut receiver, hello).await?;
-    Ok(Call { sender, receiver, welcome })
+pub async fn greet(sender: Sender, receiver: Receiver, hello: &Hello) -> Result<Call> {
+    greet_near(sender, receiver, hello, None).await
+}
+
+async fn greet_near(
+    sender: Sender,
+    mut receiver: Receiver,
+    hello: &Hello,
+    near: Option<Near>,
+) -> Result<Call> {
+    let (welcome, shares_memory) = link::greet_near(&sender, &mut receiver, hello, near).await?;
+    Ok(Call { sender, receiver, welcome, shares_memory })
 }
 
 /// Ends a connection on purpose: the reason is the last that the peer hears. What is queued is written first.

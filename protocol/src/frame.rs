@@ -74,11 +74,13 @@ pub enum Kind {
     Heartbeat = 8,
     /// Either side, last frame: the connection ends on purpose, with the reason.
     Bye = 9,
+    /// Dialling side, after a Welcome that offers memory: whether the link goes on over it. The listening side repeats it.
+    Memory = 10,
 }
 
 impl Kind {
     /// Every kind, in the order of its number, which starts at 1.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Hello,
         Self::Welcome,
         Self::Refuse,
@@ -88,6 +90,7 @@ impl Kind {
         Self::Bulk,
         Self::Heartbeat,
         Self::Bye,
+        Self::Memory,
     ];
 
     /// The kind with the number `byte`.
@@ -109,6 +112,7 @@ impl Kind {
             Self::Cycle | Self::Totals => CYCLE_LIMIT,
             Self::Bulk => BULK_LIMIT,
             Self::Heartbeat => 0,
+            Self::Memory => 1,
         }
     }
 
@@ -124,6 +128,7 @@ impl Kind {
             Self::Bulk => "bulk",
             Self::Heartbeat => "heartbeat",
             Self::Bye => "bye",
+            Self::Memory => "memory",
         }
     }
 }

@@ -5,6 +5,7 @@
 //! into frames: no socket, no clock. What certificates proved comes in through [`Policy`].
 
 use crate::frame::{Frame, HELLO_LIMIT, Header, Kind, REASON_LIMIT, WELCOME_LIMIT};
+use crate::memory::{Ends, Offer};
 use crate::{Error, Result, codec, tls};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -30,6 +31,7 @@ use std::fmt;
 /// 14: votes foresee strikes on rigid walls, setups have parts that are rigid for a time.
 /// 15: relaxation has a rate.
 /// 16: shells of four points and membranes, thicknesses by shell, springs, cables, and pressures that move.
+/// 17: processes of one machine may go on over memory.
 pub const VERSION: u16 = 17;
 
 /// Most characters of a host's name.
@@ -125,6 +127,8 @@ pub struct Hello {
     pub memory: u64,
     /// Of a worker: whether it can give some of its threads to another connection. False for other roles.
     pub divides: bool,
+    /// The connection as the sender sees it, if it would go on over memory of this machine.
+    pub near: Option<Ends>,
 }
 
 impl Hello {
@@ -152,6 +156,7 @@ impl Hello {
             proof: None,
             memory: 0,
             divides: false,
+            near: None,
         }
     }
 
@@ -228,7 +233,7 @@ fn check_name(what: &str, name: &str, limit: usize) -> std::result::Result<(), S
     Err(format!("{what} {shown:?} of {} bytes, must be 1 to {limit} letters, digits, - _ or .", name.len()))
 }
 
-/// The place that the listening side gives. Sent once, in answer to Hello; not answered.
+/// The place that the listening side gives. Sent once, in answer to Hello; answered only where it offers memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Welcome {
     /// What the dialling side writes into its frames from now on; never 0, never given twice.
@@ -237,6 +242,15 @@ pub struct Welcome {
     pub host: u32,
     /// The interval of heartbeats in both directions, milliseconds, within [`HEARTBEAT_MS`].
     pub heartbeat_ms: u32,
+    /// Memory over which the link may go on; the dialling side says whether it does. See [`crate::memory`].
+    pub memory: Option<Offer>,
+}
+
+impl Welcome {
+    /// One without memory.
+    pub const fn new(incarnation: u32, host: u32, heartbeat_ms: u32) -> Self {
+        Self { incarnation, host, heartbeat_ms, memory: None }
+    }
 }
 
 /// How far a handshake has come.

@@ -3,7 +3,7 @@
 //! From the wire upward: [`frame`] is the header that every message starts with and the bounds that
 //! are checked before anything is allocated; [`codec`] turns values and arrays into payloads and cuts
 //! large messages into chunks; [`link`] carries frames both ways over any byte stream without one
-//! direction waiting for the other; [`order`] keeps control messages in order over it; [`handshake`] says who is at the other end; [`tls`] proves it, and a [`token`] brings a newcomer there. [`message`] and
+//! direction waiting for the other; [`order`] keeps control messages in order over it; [`memory`] carries it within one machine; [`handshake`] says who is at the other end; [`tls`] proves it, and a [`token`] brings a newcomer there. [`message`] and
 //! [`wire`] are what master and workers say in a run, [`phase`] how workers report on their time, [`request`] what clients
 //! ask and [`options`] what they ask of a run, [`dial`] how to call; [`shape`] makes a stream as slow as an emulated wire.
 //!
@@ -15,6 +15,7 @@ pub mod dial;
 pub mod frame;
 pub mod handshake;
 pub mod link;
+pub mod memory;
 pub mod message;
 pub mod options;
 pub mod order;

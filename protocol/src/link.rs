@@ -25,7 +25,7 @@ mod sender;
 mod socket;
 mod writer;
 
-pub use greeting::{GREETING_LIMIT, admit, greet, hear};
+pub use greeting::{GREETING_LIMIT, admit, admit_near, greet, greet_near, hear};
 pub use receiver::Receiver;
 pub use sender::Sender;
 pub use socket::Socket;

@@ -78,6 +78,8 @@ pub struct Options {
     pub port: Option<Shape>,
     /// Whether and where it takes other workers.
     pub peers: Listen,
+    /// Links within this machine may go on over memory; never through an emulated port.
+    pub share_memory: bool,
     /// What computes its tasks.
     pub compute: Compute,
     /// When it steps back for the people whose PC it is on.
@@ -281,6 +283,7 @@ async fn stay(process: Process, mut hello: Hello, slot: Slot) -> std::result::Re
                 info!(
                     host = call.welcome.host,
                     incarnation = call.welcome.incarnation,
+                    shares_memory = call.shares_memory,
                     "joined {}",
                     options.master
                 );
@@ -323,7 +326,8 @@ async fn join(
     listening: &mut Option<IpAddr>,
     service: &mut Service,
 ) -> Result<Call> {
-    let reached = dial::reach(&options.master, certificates).await?.through(options.port.as_ref());
+    let reached = dial::reach(&options.master, certificates).await?;
+    let reached = reached.through(options.port.as_ref()).sharing_memory(options.share_memory);
     let ip = reached.local_ip()?;
     if let Listen::Port { port, announce } = options.peers
         && *listening != Some(ip)
@@ -331,8 +335,8 @@ async fn join(
         service.peers = None;
         let listener = Peers::bind(ip, port).await?;
         let bound = listener.local_addr().map_err(|e| Error::io("the port for other workers", &e))?;
-        service.peers =
-            Some(Arc::new(Peers::start(listener, options.certs.as_deref(), options.port.clone())?));
+        let (certs, port) = (options.certs.as_deref(), options.port.clone());
+        service.peers = Some(Arc::new(Peers::start(listener, certs, port, options.share_memory)?));
         *listening = Some(ip);
         hello.peer_port = announce.unwrap_or(bound.port());
         info!(announced = hello.peer_port, "listening for other workers on {bound}");
@@ -378,7 +382,7 @@ async fn serve_until(
     Service { pool, peers, compute, share, slot }: Service,
     mut told: Told,
 ) -> Error {
-    let Call { sender, mut receiver, welcome } = call;
+    let Call { sender, mut receiver, welcome, .. } = call;
     let (send, messages) = mpsc::channel(WAITING_MESSAGES);
     let (fail, mut failed) = oneshot::channel();
     let outbox = Outbox::new(sender.clone(), welcome.incarnation);

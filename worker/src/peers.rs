@@ -63,6 +63,8 @@ struct Shared {
     certificates: Option<(Arc<ServerConfig>, Arc<ClientConfig>)>,
     /// This host's emulated port.
     port: Option<Shape>,
+    /// Links within this machine may go on over memory.
+    share_memory: bool,
     /// Who may call now.
     circle: watch::Sender<Option<Arc<Circle>>>,
     runtime: Handle,
@@ -70,11 +72,16 @@ struct Shared {
 
 impl Peers {
     /// Takes peers on `listener`, with the certificates in a folder if there are any, through this host's emulated
-    /// port if it has one. Called within a runtime.
+    /// port if it has one; else over memory within this machine, if that may be. Called within a runtime.
     ///
     /// # Errors
     /// [`Error::Certificate`].
-    pub fn start(listener: TcpListener, certs: Option<&Path>, port: Option<Shape>) -> Result<Self> {
+    pub fn start(
+        listener: TcpListener,
+        certs: Option<&Path>,
+        port: Option<Shape>,
+        share_memory: bool,
+    ) -> Result<Self> {
         let certificates = match certs {
             None => None,
             Some(folder) => {
@@ -85,6 +92,7 @@ impl Peers {
         let shared = Arc::new(Shared {
             certificates,
             port,
+            share_memory,
             circle: watch::Sender::new(None),
             runtime: Handle::current(),
         });

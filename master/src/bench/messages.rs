@@ -19,6 +19,7 @@ use protocol::{
     frame::{Frame, Header, Kind},
     handshake::{Hello, Policy, Role, Welcome},
     link::{self, Receiver, Sender, Settings, Socket},
+    memory::Near,
     tls::{self, ServerConfig},
 };
 use serde::Serialize;
@@ -36,6 +37,8 @@ pub struct Row {
     pub kind: &'static str,
     /// Whether TLS was on.
     pub tls: bool,
+    /// Whether it went over memory, within this machine.
+    pub memory: bool,
     pub bytes: usize,
     /// Half of a round trip (us), the median of the rounds.
     pub half_round_trip_us: f64,
@@ -54,18 +57,24 @@ pub fn run(args: &MessagesArgs) -> std::result::Result<ExitCode, String> {
         .build()
         .map_err(|e| format!("the thread of the link: {e}"))?;
     if let Some(address) = args.listen {
-        runtime.block_on(far_end(address, args.certs.as_deref())).map_err(|e| e.to_string())?;
+        let far = far_end(address, args.certs.as_deref(), !args.no_shared_memory);
+        runtime.block_on(far).map_err(|e| e.to_string())?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut rows = Vec::new();
     match &args.to {
         Some(to) => rows.extend(runtime.block_on(near_end(to, args)).map_err(|e| e.to_string())?),
         None => {
-            for tls in [false, true] {
+            // Over memory where there is some, over TCP, and with TLS.
+            let may_share = system::shared::IS_THERE && !args.no_shared_memory;
+            for (memory, tls) in [(true, false), (false, false), (false, true)] {
+                if memory && !may_share {
+                    continue;
+                }
                 let certs = if tls { Some(Certificates::new().map_err(|e| e.to_string())?) } else { None };
                 let folder = certs.as_ref().map(|made| made.folder.join("pc"));
                 let far = FarEnd::start(folder.as_deref())?;
-                let args = MessagesArgs { certs: folder, ..args.clone() };
+                let args = MessagesArgs { certs: folder, no_shared_memory: !memory, ..args.clone() };
                 rows.extend(runtime.block_on(near_end(&far.address, &args)).map_err(|e| e.to_string())?);
             }
         }
@@ -79,10 +88,15 @@ pub fn run(args: &MessagesArgs) -> std::result::Result<ExitCode, String> {
 }
 
 fn print_table(rows: &[Row]) {
-    println!("{:>10}  {:>5}  {:>3}  {:>14}  {:>8}", "bytes", "kind", "TLS", "half trip (us)", "MB/s");
+    println!("{:>10}  {:>5}  {:>6}  {:>14}  {:>8}", "bytes", "kind", "way", "half trip (us)", "MB/s");
     for row in rows {
-        let (tls, half, rate) = (if row.tls { "on" } else { "off" }, row.half_round_trip_us, row.mb_per_s);
-        println!("{:>10}  {:>5}  {tls:>3}  {half:>14.2}  {rate:>8.0}", row.bytes, row.kind);
+        let way = match (row.memory, row.tls) {
+            (true, _) => "memory",
+            (false, true) => "TLS",
+            (false, false) => "TCP",
+        };
+        let (half, rate) = (row.half_round_trip_us, row.mb_per_s);
+        println!("{:>10}  {:>5}  {way:>6}  {half:>14.2}  {rate:>8.0}", row.bytes, row.kind);
     }
 }
 
@@ -99,7 +113,8 @@ const fn trips(bytes: usize) -> u64 {
 async fn near_end(to: &str, args: &MessagesArgs) -> Result<Vec<Row>> {
     let certificates = dial::certificates(args.certs.as_deref())?;
     let hello = Hello::new(Role::Client, "bench", 1.0, 1, "scalar", worker::random());
-    let mut call = dial::dial(to, certificates.as_ref(), &hello).await?;
+    let reached = dial::reach(to, certificates.as_ref()).await?.sharing_memory(!args.no_shared_memory);
+    let mut call = reached.greet(&hello).await?;
     let mut rows = Vec::new();
     for kind in [Kind::Cycle, Kind::Bulk] {
         for &bytes in &args.sizes {
@@ -112,6 +127,7 @@ async fn near_end(to: &str, args: &MessagesArgs) -> Result<Vec<Row>> {
             rows.push(Row {
                 kind: if kind == Kind::Bulk { "bulk" } else { "frame" },
                 tls: certificates.is_some(),
+                memory: call.shares_memory,
                 bytes,
                 half_round_trip_us: 1e6 * half,
                 mb_per_s: bytes as f64 / half * 1e-6,
@@ -173,7 +189,7 @@ async fn take(receiver: &mut Receiver) -> Result<(Header, Vec<u8>)> {
 }
 
 /// Listens at `address`, says where on standard output, and returns what the first caller sends.
-async fn far_end(address: SocketAddr, certs: Option<&Path>) -> Result<()> {
+async fn far_end(address: SocketAddr, certs: Option<&Path>, share_memory: bool) -> Result<()> {
     let config = certs.map(|folder| tls::server_config(&tls::Paths::in_folder(folder))).transpose()?;
     if config.is_none() {
         tls::loopback_only(address)?;
@@ -182,7 +198,7 @@ async fn far_end(address: SocketAddr, certs: Option<&Path>) -> Result<()> {
     let listener = TcpListener::bind(address).await.map_err(fault)?;
     println!("listening on {}", listener.local_addr().map_err(fault)?);
     let (stream, _) = listener.accept().await.map_err(fault)?;
-    let (sender, mut receiver) = answer(stream, config.as_ref()).await?;
+    let (sender, mut receiver) = answer(stream, config.as_ref(), share_memory).await?;
     loop {
         let (header, message) = match take(&mut receiver).await {
             Ok(message) => message,
@@ -193,8 +209,13 @@ async fn far_end(address: SocketAddr, certs: Option<&Path>) -> Result<()> {
     }
 }
 
-async fn answer(stream: TcpStream, config: Option<&Arc<ServerConfig>>) -> Result<(Sender, Receiver)> {
+async fn answer(
+    stream: TcpStream,
+    config: Option<&Arc<ServerConfig>>,
+    share_memory: bool,
+) -> Result<(Sender, Receiver)> {
     let stream = Socket::new(stream)?;
+    let near = if share_memory { Near::of(&stream) } else { None };
     let (certificate, (sender, mut receiver)) = match config {
         None => (None, link::split(stream, Settings::default())),
         Some(config) => {
@@ -203,9 +224,9 @@ async fn answer(stream: TcpStream, config: Option<&Arc<ServerConfig>>) -> Result
         }
     };
     let policy = Policy { roles: vec![Role::Client], certificate, ..Policy::default() };
-    let (server, _) = link::hear(&sender, &mut receiver, policy).await?;
-    let welcome = Welcome { incarnation: 1, host: 0, heartbeat_ms: HEARTBEAT_MS };
-    link::admit(server, &sender, &mut receiver, welcome)?;
+    let (server, hello) = link::hear(&sender, &mut receiver, policy).await?;
+    let welcome = Welcome::new(1, 0, HEARTBEAT_MS);
+    link::admit_near(server, &sender, &mut receiver, welcome, &hello, near).await?;
     Ok((sender, receiver))
 }
 
@@ -295,7 +316,7 @@ mod tests {
         let address = listener.local_addr().expect("bound").to_string();
         let far = async {
             let (stream, _) = listener.accept().await.expect("a caller");
-            let (sender, mut receiver) = answer(stream, None).await.expect("a greeting");
+            let (sender, mut receiver) = answer(stream, None, true).await.expect("a greeting");
             loop {
                 match take(&mut receiver).await {
                     Ok((header, message)) => give(&sender, header, message).expect("room"),
@@ -309,6 +330,7 @@ mod tests {
             certs: None,
             sizes: vec![0, 8, CHUNK + 1],
             rounds: 1,
+            no_shared_memory: true,
             json: false,
         };
         let (error, rows) = tokio::join!(far, near_end(&address, &args));

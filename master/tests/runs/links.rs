@@ -101,7 +101,7 @@ where
                 // What it accepts has the buffers of what it listens on.
                 let listener = tight_socket("127.0.0.1:0").listen(16).expect("listens");
                 hello.peer_port = listener.local_addr().expect("bound").port();
-                Some(Arc::new(Peers::start(listener, None, None).expect("no certificates")))
+                Some(Arc::new(Peers::start(listener, None, None, false).expect("no certificates")))
             }
         };
         tokio::spawn(Arc::clone(&acceptor).serve(near, format!("127.0.0.1:{}", i + 1), None));

@@ -207,6 +207,13 @@ impl Receiver {
         self.shared.silence_us.store(super::micros(limit), Relaxed);
     }
 
+    /// Goes on with another stream behind the last frame; what has come of the one before means nothing.
+    pub(super) fn go_on_with(&mut self, stream: Stream) {
+        let incoming = &mut self.incoming;
+        (incoming.stream, incoming.from, incoming.to) = (stream, 0, 0);
+        (incoming.header, incoming.head_bytes) = (None, 0);
+    }
+
     /// Gives a payload back, for a later frame to use its memory.
     pub fn recycle(&self, payload: Vec<u8>) {
         self.shared.recycle(payload);

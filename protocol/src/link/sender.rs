@@ -1,6 +1,6 @@
 //! The sending half: two bounded queues.
 
-use super::writer::{DIRECT_BYTES, write_at_once, write_out};
+use super::writer::{DIRECT_BYTES, Stream, write_at_once, write_out};
 use super::{Counters, Shared, lock, micros};
 use crate::codec::{Chunker, OPEN_STREAMS};
 use crate::frame::{Frame, Header, Kind, checked_length};
@@ -139,6 +139,13 @@ impl Sender {
         drop(queue);
         self.shared.work.notify_one();
         Ok(())
+    }
+
+    /// Goes on with another stream: at once, or behind the next frame of kind memory.
+    pub(super) fn go_on_with(&self, stream: Stream, at_once: bool) {
+        if let Some(writer) = lock(&self.shared.writer).as_mut() {
+            writer.go_on_with(stream, at_once);
+        }
     }
 
     /// An empty buffer for a payload, with the capacity of one that has been written if there is any.

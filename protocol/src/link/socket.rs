@@ -35,6 +35,19 @@ impl Socket {
     pub fn local_addr(&self) -> std::io::Result<SocketAddr> {
         self.0.local_addr()
     }
+
+    /// The address of the other side.
+    ///
+    /// # Errors
+    /// If the system does not know it.
+    pub fn peer_addr(&self) -> std::io::Result<SocketAddr> {
+        self.0.peer_addr()
+    }
+
+    /// The same connection once more: it ends when both are dropped.
+    pub(crate) fn another(&self) -> std::io::Result<socket2::Socket> {
+        socket2::SockRef::from(&self.0).try_clone()
+    }
 }
 
 impl AsyncRead for Socket {

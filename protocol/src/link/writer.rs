@@ -34,11 +34,20 @@ pub(super) struct Writer {
     unflushed: bool,
     /// The stream took no more, and wakes the writing task when it does.
     blocked: bool,
+    /// Where the link goes on, and whether it is time to.
+    next: Option<Stream>,
+    moves: bool,
 }
 
 impl Writer {
     pub(super) fn new(stream: Stream) -> Self {
-        Self { stream, batch: VecDeque::with_capacity(BATCH), taken: 0, unflushed: false, blocked: false }
+        let batch = VecDeque::with_capacity(BATCH);
+        Self { stream, batch, taken: 0, unflushed: false, blocked: false, next: None, moves: false }
+    }
+
+    /// Goes on with another stream: at once, but for a frame under way, or behind the next frame of kind memory.
+    pub(super) fn go_on_with(&mut self, stream: Stream, at_once: bool) {
+        (self.next, self.moves) = (Some(stream), at_once);
     }
 
     /// Writes until nothing is left that `bulk` allows, or the stream takes no more.
@@ -52,15 +61,26 @@ impl Writer {
                 self.unflushed = true;
                 self.took(count, shared);
             }
+            if self.moves {
+                ready!(self.poll_flush(cx))?;
+                self.moves = false;
+                if let Some(next) = self.next.take() {
+                    self.stream = next;
+                }
+            }
             self.refill(shared, bulk)?;
             if self.batch.is_empty() {
-                if self.unflushed {
-                    ready!(Pin::new(&mut self.stream).poll_flush(cx))?;
-                    self.unflushed = false;
-                }
-                return Poll::Ready(Ok(()));
+                return self.poll_flush(cx);
             }
         }
+    }
+
+    fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<Result<()>> {
+        if self.unflushed {
+            ready!(Pin::new(&mut self.stream).poll_flush(cx))?;
+            self.unflushed = false;
+        }
+        Poll::Ready(Ok(()))
     }
 
     fn poll_batch(&mut self, cx: &mut Context<'_>) -> Poll<Result<usize>> {
@@ -90,6 +110,7 @@ impl Writer {
             }
             self.taken -= bytes;
             if let Some((_, frame)) = self.batch.pop_front() {
+                self.moves |= frame.header.kind == Kind::Memory && self.next.is_some();
                 shared.sent(frame, bytes);
             }
         }
@@ -102,7 +123,11 @@ impl Writer {
         while self.batch.len() < BATCH && bytes < WRITE_BUFFER {
             let Some(frame) = queue.pop_urgent() else { break };
             bytes += HEADER_LEN + frame.payload.len();
+            let is_last = frame.header.kind == Kind::Memory;
             self.batch.push_back(([0; HEADER_LEN], frame));
+            if is_last {
+                break;
+            }
         }
         if self.batch.is_empty()
             && bulk

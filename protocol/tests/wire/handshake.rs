@@ -12,7 +12,7 @@ fn policy() -> Policy {
     Policy { roles: vec![Role::Worker, Role::Client], ..Policy::default() }
 }
 
-const WELCOME: Welcome = Welcome { incarnation: 3, host: 1, heartbeat_ms: 1000 };
+const WELCOME: Welcome = Welcome::new(3, 1, 1000);
 
 /// The reason for which a server refuses `frame`, as the client reads it.
 fn refusal(policy: Policy, frame: &Frame) -> String {
@@ -52,6 +52,7 @@ fn greeting_has_its_golden_bytes() {
         0,                                               // no proof
         0, 0, 0, 0, 0, 0, 0, 0,                          // does not say what memory it has
         0,                                               // does not divide
+        0,                                               // stays on TCP
     ];
     assert_eq!(frame.payload, golden);
     assert_eq!(frame.header, Header::new(Kind::Hello));
@@ -63,7 +64,7 @@ fn welcome_has_its_golden_bytes() {
     let (_, frame) = Client::new(&hello()).expect("a good greeting");
     server.apply(&frame).expect("the first frame");
     let frame = server.welcome(WELCOME).expect("greeted");
-    assert_eq!(frame.payload, [3, 0, 0, 0, 1, 0, 0, 0, 0xe8, 3, 0, 0]);
+    assert_eq!(frame.payload, [3, 0, 0, 0, 1, 0, 0, 0, 0xe8, 3, 0, 0, 0]);
 }
 
 #[test]
@@ -124,7 +125,7 @@ fn frames_that_are_no_greeting_are_refused() {
     let (_, mut frame) = Client::new(&hello()).expect("a good greeting");
     frame.payload.push(0);
     let reason = refusal(policy(), &frame);
-    assert_eq!(reason, "hello: message of 64 bytes in a payload of 65");
+    assert_eq!(reason, "hello: message of 65 bytes in a payload of 66");
     for length in 0..frame.payload.len() - 1 {
         let cut = Frame::new(frame.header, frame.payload[..length].to_vec());
         assert!(refusal(policy(), &cut).starts_with("hello: control message: "), "{length} bytes");

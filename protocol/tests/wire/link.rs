@@ -1,4 +1,4 @@
-//! Links over pipes in memory and over TCP: both ways at once, overtaking, silence, ends.
+//! Links over pipes, over TCP and over memory that is shared: both ways at once, overtaking, silence, ends.
 
 use protocol::codec::{Assembler, put_f64s};
 use protocol::frame::{CHUNK, Frame, HEADER_LEN, Header, Kind, encode_header};
@@ -8,11 +8,31 @@ use protocol::link::{
 };
 use protocol::{Error, Result};
 use std::time::Duration;
-use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, duplex};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio::time::{Instant, advance, timeout};
 
+use crate::memory;
+
 const SIX_MB: usize = 6_000_000;
+
+/// What a link goes over in a test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    /// A pipe of so many bytes.
+    Pipe(usize),
+    Memory,
+}
+
+/// A pipe of so many bytes, and shared memory where there is any.
+fn ways(bytes: usize) -> Vec<Way> {
+    let memory = system::shared::IS_THERE.then_some(Way::Memory);
+    [Way::Pipe(bytes)].into_iter().chain(memory).collect()
+}
+
+trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
+
+impl<S: AsyncRead + AsyncWrite + Send + Unpin> Stream for S {}
 
 fn frame(kind: Kind, cycle: u64, payload: Vec<u8>) -> Frame {
     Frame::new(Header { cycle, ..Header::new(kind) }, payload)
@@ -23,13 +43,27 @@ fn pair(bytes: usize) -> ((Sender, Receiver), DuplexStream) {
     (split(near, Settings::default()), far)
 }
 
+/// The same over one of [`ways`].
+async fn pair_over(way: Way) -> ((Sender, Receiver), Box<dyn Stream>) {
+    match way {
+        Way::Pipe(bytes) => {
+            let (link, far) = pair(bytes);
+            (link, Box::new(far))
+        }
+        Way::Memory => {
+            let (near, far) = memory::streams().await;
+            (split(near, Settings::default()), Box::new(far))
+        }
+    }
+}
+
 /// Settings under which a slow machine adds no heartbeats to the counters.
-fn no_heartbeats() -> Settings {
+pub(crate) fn no_heartbeats() -> Settings {
     Settings { heartbeat: Duration::from_secs(600), silence: Duration::from_secs(600), ..Settings::default() }
 }
 
 /// Sends a 6 MB cycle frame and a 6 MB bulk message, and takes as much from the other side.
-async fn exchange((sender, mut receiver): (Sender, Receiver), mine: u8, theirs: u8) {
+pub(crate) async fn exchange((sender, mut receiver): (Sender, Receiver), mine: u8, theirs: u8) {
     sender.send(frame(Kind::Cycle, 1, vec![mine; SIX_MB])).expect("queued");
     sender.send_bulk(Header::new(Kind::Bulk), 1, vec![mine; SIX_MB]).expect("queued");
     let mut assembler = Assembler::new(SIX_MB as u64, 1);
@@ -97,21 +131,25 @@ async fn two_peers_that_both_send_megabytes_finish_over_tcp_with_small_buffers()
 
 #[tokio::test]
 async fn cycle_frames_overtake_bulk() {
-    let ((sender, _receiver), far) = pair(1024);
-    sender.send_bulk(Header::new(Kind::Bulk), 1, vec![7; 100 * CHUNK]).expect("queued");
-    // Let the writer fill its buffer and the pipe before the cycle frame is queued.
-    for _ in 0..100 {
-        tokio::task::yield_now().await;
+    for way in ways(1024) {
+        let ((sender, _receiver), far) = pair_over(way).await;
+        sender.send_bulk(Header::new(Kind::Bulk), 1, vec![7; 100 * CHUNK]).expect("queued");
+        // Let the writer fill its buffer and the pipe before the cycle frame is queued.
+        for _ in 0..100 {
+            tokio::task::yield_now().await;
+        }
+        let mut payload = sender.buffer();
+        put_f64s(&mut payload, &[1.0, 2.0]);
+        sender.send(frame(Kind::Cycle, 5, payload)).expect("queued");
+        let (_far_sender, mut receiver) = split(far, Settings::default());
+        let mut ahead = 0;
+        while receiver.receive().await.expect("a frame").header.kind == Kind::Bulk {
+            ahead += 1;
+        }
+        let held = if way == Way::Memory { protocol::memory::ring::BYTES } else { 0 };
+        let limit = (held + WRITE_BUFFER) / CHUNK + 1;
+        assert!((1..=limit).contains(&ahead), "{ahead} of 100 chunks were ahead over {way:?}");
     }
-    let mut payload = sender.buffer();
-    put_f64s(&mut payload, &[1.0, 2.0]);
-    sender.send(frame(Kind::Cycle, 5, payload)).expect("queued");
-    let (_far_sender, mut receiver) = split(far, Settings::default());
-    let mut ahead = 0;
-    while receiver.receive().await.expect("a frame").header.kind == Kind::Bulk {
-        ahead += 1;
-    }
-    assert!((1..=WRITE_BUFFER / CHUNK + 1).contains(&ahead), "{ahead} of 100 chunks were ahead");
 }
 
 #[tokio::test]
@@ -141,16 +179,18 @@ async fn cycle_frames_overtake_bulk_in_the_system_too() {
 
 #[tokio::test]
 async fn bulk_messages_take_turns() {
-    let ((sender, _receiver), far) = pair(1024);
-    for stream in [1, 2] {
-        sender.send_bulk(Header::new(Kind::Bulk), stream, vec![0; 3 * CHUNK]).expect("queued");
+    for way in ways(1024) {
+        let ((sender, _receiver), far) = pair_over(way).await;
+        for stream in [1, 2] {
+            sender.send_bulk(Header::new(Kind::Bulk), stream, vec![0; 3 * CHUNK]).expect("queued");
+        }
+        let (_far_sender, mut receiver) = split(far, Settings::default());
+        let mut streams = Vec::new();
+        for _ in 0..6 {
+            streams.push(receiver.receive().await.expect("a chunk").payload[0]);
+        }
+        assert_eq!(streams, [1, 2, 1, 2, 1, 2], "over {way:?}");
     }
-    let (_far_sender, mut receiver) = split(far, Settings::default());
-    let mut streams = Vec::new();
-    for _ in 0..6 {
-        streams.push(receiver.receive().await.expect("a chunk").payload[0]);
-    }
-    assert_eq!(streams, [1, 2, 1, 2, 1, 2]);
 }
 
 #[tokio::test]
@@ -159,8 +199,9 @@ async fn a_stream_cut_at_any_byte_ends_with_an_error() {
     whole.seal().expect("three bytes");
     let mut bytes = encode_header(&whole.header).to_vec();
     bytes.extend_from_slice(b"abc");
-    for length in 0..=bytes.len() {
-        let ((_sender, mut receiver), mut far) = pair(4096);
+    let cuts = ways(4096).into_iter().flat_map(|way| (0..=bytes.len()).map(move |length| (way, length)));
+    for (way, length) in cuts {
+        let ((_sender, mut receiver), mut far) = pair_over(way).await;
         far.write_all(&bytes[..length]).await.expect("room");
         drop(far);
         let (found, header) = (length as u64, HEADER_LEN as u64);
@@ -170,7 +211,7 @@ async fn a_stream_cut_at_any_byte_ends_with_an_error() {
             HEADER_LEN..55 => Err(Error::Truncated { what: "control", found: found - header, needed: 3 }),
             _ => Ok(whole.clone()),
         };
-        assert_eq!(receiver.receive().await, expected, "cut after {length} bytes");
+        assert_eq!(receiver.receive().await, expected, "cut after {length} bytes over {way:?}");
     }
 }
 
@@ -184,32 +225,35 @@ async fn a_bit_flipped_anywhere_in_a_stream_never_passes() {
         bytes.extend_from_slice(&frame.payload);
     }
     let first = HEADER_LEN + 3;
-    for bit in 0..bytes.len() * 8 {
+    let bits = ways(4096).into_iter().flat_map(|way| (0..bytes.len() * 8).map(move |bit| (way, bit)));
+    for (way, bit) in bits {
         let mut damaged = bytes.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
-        let ((_sender, mut receiver), mut far) = pair(4096);
+        let ((_sender, mut receiver), mut far) = pair_over(way).await;
         far.write_all(&damaged).await.expect("room");
         if bit / 8 >= first {
             assert_eq!(receiver.receive().await.as_ref(), Ok(&frames[0]));
         }
         // The pipe is still open: the fault is found without waiting for more bytes.
         let answer = timeout(Duration::from_secs(5), receiver.receive()).await.expect("at once");
-        assert!(answer.is_err(), "bit {bit} passed: {answer:?}");
+        assert!(answer.is_err(), "bit {bit} passed over {way:?}: {answer:?}");
         assert_eq!(receiver.receive().await, answer, "what follows is not looked at");
     }
 }
 
 #[tokio::test]
 async fn a_bad_frame_ends_the_link_for_its_sender_too() {
-    let ((sender, mut receiver), mut far) = pair(4096);
-    far.write_all(b"GET / HTTP/1.1\r\nHost: 127.0.0.1:4711\r\nAccept: */*\r\n\r\n").await.expect("room");
-    let error = receiver.receive().await.expect_err("no frame");
-    assert_eq!(error, Error::Magic { found: *b"GET " });
-    assert_eq!(sender.send(frame(Kind::Cycle, 1, Vec::new())), Err(error.clone()));
-    assert_eq!(sender.finish().await, Err(error));
-    let mut rest = Vec::new();
-    drop(receiver);
-    assert_eq!(far.read_to_end(&mut rest).await.expect("closed"), 0);
+    for way in ways(4096) {
+        let ((sender, mut receiver), mut far) = pair_over(way).await;
+        far.write_all(b"GET / HTTP/1.1\r\nHost: 127.0.0.1:4711\r\nAccept: */*\r\n\r\n").await.expect("room");
+        let error = receiver.receive().await.expect_err("no frame");
+        assert_eq!(error, Error::Magic { found: *b"GET " });
+        assert_eq!(sender.send(frame(Kind::Cycle, 1, Vec::new())), Err(error.clone()));
+        assert_eq!(sender.finish().await, Err(error));
+        let mut rest = Vec::new();
+        drop(receiver);
+        assert_eq!(far.read_to_end(&mut rest).await.expect("closed"), 0);
+    }
 }
 
 #[tokio::test]
@@ -224,21 +268,23 @@ async fn the_limit_before_the_handshake_holds() {
 
 #[tokio::test]
 async fn receiving_may_be_cancelled_at_any_byte() {
-    let ((_sender, mut receiver), mut far) = pair(4096);
     let mut whole = frame(Kind::Control, 3, b"abc".to_vec());
     whole.seal().expect("three bytes");
     let mut bytes = encode_header(&whole.header).to_vec();
     bytes.extend_from_slice(b"abc");
-    for byte in &bytes[..bytes.len() - 1] {
-        far.write_all(&[*byte]).await.expect("room");
-        tokio::select! {
-            biased;
-            got = receiver.receive() => panic!("{got:?} before the last byte"),
-            () = tokio::task::yield_now() => {}
+    for way in ways(4096) {
+        let ((_sender, mut receiver), mut far) = pair_over(way).await;
+        for byte in &bytes[..bytes.len() - 1] {
+            far.write_all(&[*byte]).await.expect("room");
+            tokio::select! {
+                biased;
+                got = receiver.receive() => panic!("{got:?} before the last byte"),
+                () = tokio::task::yield_now() => {}
+            }
         }
+        far.write_all(b"c").await.expect("room");
+        assert_eq!(receiver.receive().await.as_ref(), Ok(&whole), "over {way:?}");
     }
-    far.write_all(b"c").await.expect("room");
-    assert_eq!(receiver.receive().await, Ok(whole));
 }
 
 #[tokio::test(start_paused = true)]
@@ -317,25 +363,29 @@ async fn queues_toward_a_peer_that_does_not_read_are_bounded() {
 
 #[tokio::test]
 async fn what_is_queued_is_written_when_the_last_sender_is_dropped() {
-    let ((sender, _receiver), mut far) = pair(100_000);
-    let clone = sender.clone();
-    drop(sender);
-    clone.send(frame(Kind::Control, 1, vec![1; 10])).expect("one sender is left");
-    clone.send_bulk(Header::new(Kind::Bulk), 1, vec![1; 20]).expect("one sender is left");
-    drop(clone);
-    let mut bytes = Vec::new();
-    far.read_to_end(&mut bytes).await.expect("the pipe");
-    assert_eq!(bytes.len(), HEADER_LEN + 10 + HEADER_LEN + 16 + 20);
+    for way in ways(100_000) {
+        let ((sender, _receiver), mut far) = pair_over(way).await;
+        let clone = sender.clone();
+        drop(sender);
+        clone.send(frame(Kind::Control, 1, vec![1; 10])).expect("one sender is left");
+        clone.send_bulk(Header::new(Kind::Bulk), 1, vec![1; 20]).expect("one sender is left");
+        drop(clone);
+        let mut bytes = Vec::new();
+        far.read_to_end(&mut bytes).await.expect("the pipe");
+        assert_eq!(bytes.len(), HEADER_LEN + 10 + HEADER_LEN + 16 + 20, "over {way:?}");
+    }
 }
 
 #[tokio::test]
 async fn finishing_refuses_later_frames_and_aborting_ends_both_ways() {
-    let ((sender, mut receiver), _far) = pair(100_000);
-    assert_eq!(sender.finish().await, Ok(()));
-    assert_eq!(sender.send(frame(Kind::Bye, 1, Vec::new())), Err(Error::Closed));
-    let reason = Error::Message("job 4 is over".into());
-    sender.abort(reason.clone());
-    assert_eq!(receiver.receive().await, Err(reason));
+    for way in ways(100_000) {
+        let ((sender, mut receiver), _far) = pair_over(way).await;
+        assert_eq!(sender.finish().await, Ok(()));
+        assert_eq!(sender.send(frame(Kind::Bye, 1, Vec::new())), Err(Error::Closed));
+        let reason = Error::Message("job 4 is over".into());
+        sender.abort(reason.clone());
+        assert_eq!(receiver.receive().await, Err(reason));
+    }
 }
 
 fn hello(role: Role) -> Hello {
@@ -351,7 +401,7 @@ async fn greetings_pass_over_a_link_and_set_its_intervals() {
     let (a, b) = duplex(100);
     let ((a, mut a_receiver), (b, mut b_receiver)) =
         (split(a, Settings::default()), split(b, Settings::default()));
-    let welcome = Welcome { incarnation: 1, host: 0, heartbeat_ms: 50 };
+    let welcome = Welcome::new(1, 0, 50);
     let answer = async {
         let (server, heard) = hear(&b, &mut b_receiver, workers_only()).await?;
         admit(server, &b, &mut b_receiver, welcome).map(|()| heard)

@@ -4,4 +4,5 @@ mod codec;
 mod frame;
 mod handshake;
 mod link;
+mod memory;
 mod tls;

@@ -20,13 +20,13 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsStream;
 
 /// A CA of a test.
-struct Authority {
+pub(crate) struct Authority {
     name: &'static str,
     key: KeyPair,
 }
 
 impl Authority {
-    fn new(name: &'static str) -> Self {
+    pub(crate) fn new(name: &'static str) -> Self {
         Self { name, key: KeyPair::generate().expect("a key") }
     }
 
@@ -38,7 +38,7 @@ impl Authority {
     }
 
     /// A folder with the three files of a host on 127.0.0.1, changed by `change` before signing.
-    fn host(&self, uri: &str, change: impl FnOnce(&mut CertificateParams)) -> (TempDir, Paths) {
+    pub(crate) fn host(&self, uri: &str, change: impl FnOnce(&mut CertificateParams)) -> (TempDir, Paths) {
         let mut params = CertificateParams::new(vec!["127.0.0.1".into()]).expect("an address");
         params.distinguished_name.push(DnType::CommonName, "pc-1");
         params.subject_alt_names.push(SanType::URI(uri.try_into().expect("ASCII")));

@@ -6,6 +6,7 @@ use protocol::{
     Error, Result, dial,
     handshake::{Hello, Membership, Policy, Role, Welcome},
     link::{self, Receiver, Sender},
+    memory::Near,
     shape::Shaped,
     tls,
 };
@@ -13,7 +14,7 @@ use tokio::{
     net::{TcpListener, TcpStream},
     sync::Semaphore,
 };
-use tracing::warn;
+use tracing::{debug, warn};
 
 use super::{CONNECTIONS, Circle, DIAL_LIMIT, HEARTBEAT_MS, Shared, settings};
 use crate::input::{Input, Key, News, What};
@@ -47,18 +48,20 @@ pub(super) async fn listen(listener: TcpListener, shared: Arc<Shared>) {
 
 /// Serves a connection to its end. What happens once it stands is told to the compute thread.
 async fn take(shared: &Shared, stream: TcpStream) -> Result<()> {
-    let stream = Shaped::new(link::Socket::new(stream)?, shared.port.as_ref());
+    let socket = link::Socket::new(stream)?;
+    let near = if shared.share_memory && shared.port.is_none() { Near::of(&socket) } else { None };
+    let stream = Shaped::new(socket, shared.port.as_ref());
     match &shared.certificates {
         None => {
             let (sender, receiver) = link::split(stream, settings());
-            admit(shared, sender, receiver, None).await
+            admit(shared, sender, receiver, None, near).await
         }
         Some((config, _)) => {
             let (stream, identity) = tls::accept(stream, config).await?;
             let (sender, receiver) = link::split(stream, settings());
             let role = identity.role;
             tls::watch(&sender, identity, None);
-            admit(shared, sender, receiver, Some(role)).await
+            admit(shared, sender, receiver, Some(role), near).await
         }
     }
 }
@@ -68,6 +71,7 @@ async fn admit(
     sender: Sender,
     mut receiver: Receiver,
     certificate: Option<tls::Role>,
+    near: Option<Near>,
 ) -> Result<()> {
     let policy = Policy { roles: vec![Role::Peer], certificate, ..Policy::default() };
     let (mut server, hello) = link::hear(&sender, &mut receiver, policy).await?;
@@ -80,8 +84,9 @@ async fn admit(
         }
     };
     let incarnation = circle.who.peer_workers[index as usize].incarnation;
-    let welcome = Welcome { incarnation, host: circle.who.me, heartbeat_ms: HEARTBEAT_MS };
-    link::admit(server, &sender, &mut receiver, welcome)?;
+    let welcome = Welcome::new(incarnation, circle.who.me, HEARTBEAT_MS);
+    let shares = link::admit_near(server, &sender, &mut receiver, welcome, &hello, near).await?;
+    debug!("worker {index} has called; shares memory: {shares}");
     // The place in the queue was taken before: the job does not start before the caller knows of its link, so this
     // stands in the queue before the first cycle does.
     news.send(Input::Peer(News { key: circle.key, from: index, what: What::Stands(sender) }));
@@ -129,7 +134,8 @@ pub(super) async fn dial(shared: Arc<Shared>, circle: Arc<Circle>, other: u32) {
     });
     match call {
         Err(error) => circle.tell(other, What::Failed(error)).await,
-        Ok(dial::Call { sender, mut receiver, .. }) => {
+        Ok(dial::Call { sender, mut receiver, shares_memory, .. }) => {
+            debug!("worker {other} has answered; shares memory: {shares_memory}");
             circle.tell(other, What::Stands(sender)).await;
             circle.carry(other, &mut receiver).await;
         }
@@ -153,7 +159,8 @@ async fn reach(shared: &Shared, circle: &Circle, other: u32) -> Result<dial::Cal
     hello.member = Some(Membership { job: circle.key.job, epoch: circle.key.epoch, index: who.me });
     let certificates = shared.certificates.as_ref().map(|(_, config)| config);
     let reached = dial::reach_peer(address, certificates, settings()).await?;
-    let call = reached.through(shared.port.as_ref()).greet(&hello).await?;
+    let reached = reached.through(shared.port.as_ref()).sharing_memory(shared.share_memory);
+    let call = reached.greet(&hello).await?;
     let found = call.welcome.host;
     if found != other {
         return Err(Error::Message(format!("worker {found} answers there")));

@@ -26,9 +26,14 @@ struct Side {
     address: SocketAddr,
 }
 
+/// One whose links go over memory, where the system has any.
 async fn side(listener: TcpListener) -> Side {
+    side_over(listener, true).await
+}
+
+async fn side_over(listener: TcpListener, share_memory: bool) -> Side {
     let address = listener.local_addr().expect("bound");
-    let peers = Peers::start(listener, None, None).expect("no certificates");
+    let peers = Peers::start(listener, None, None, share_memory).expect("no certificates");
     let (send, news) = mpsc::channel(16);
     Side {
         links: Links::new(Some(&peers), send.downgrade()),
@@ -265,9 +270,20 @@ async fn large_frames_cross_over_sockets_of_four_kilobytes() {
     socket.set_send_buffer_size(4096).expect("a buffer");
     socket.set_recv_buffer_size(4096).expect("a buffer");
     socket.bind((Ipv4Addr::LOCALHOST, 0).into()).expect("a port");
-    let mut low = side(socket.listen(16).expect("listens")).await;
+    let mut low = side_over(socket.listen(16).expect("listens"), false).await;
     let mut high = side(any_port().await).await;
-    join(&mut low, &mut high).await;
+    large_frames_cross(&mut low, &mut high).await;
+}
+
+/// The same with the rings between them.
+#[tokio::test]
+async fn large_frames_cross_over_memory() {
+    let (mut low, mut high) = (side(any_port().await).await, side(any_port().await).await);
+    large_frames_cross(&mut low, &mut high).await;
+}
+
+async fn large_frames_cross(low: &mut Side, high: &mut Side) {
+    join(low, high).await;
     let n = 1_500_000;
     assert_eq!(low.links.send(1, message(0, n), 0), []);
     assert_eq!(high.links.send(0, message(0, n), 0), []);
