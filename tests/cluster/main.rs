@@ -5,6 +5,7 @@ mod disk;
 mod faults;
 mod links;
 mod losses;
+mod memory;
 mod owner;
 mod peers;
 mod runs;
