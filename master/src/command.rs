@@ -533,7 +533,7 @@ pub struct MessagesArgs {
     #[arg(long, value_name = "HOST:PORT")]
     pub to: Option<String>,
     /// Folder with this host's certificates, as `bolide certs host` makes it; the far end's must be a master's.
-    /// Without --to both ways are measured, with certificates made for it
+    /// Without --to memory, TCP and TLS are measured, with certificates made for it
     #[arg(long, value_name = "FOLDER")]
     pub certs: Option<PathBuf>,
     /// Bytes of the messages

@@ -31,7 +31,7 @@ use std::fmt;
 /// 14: votes foresee strikes on rigid walls, setups have parts that are rigid for a time.
 /// 15: relaxation has a rate.
 /// 16: shells of four points and membranes, thicknesses by shell, springs, cables, and pressures that move.
-/// 17: processes of one machine may go on over memory.
+/// 17: votes and orders travel by a tree; processes of one machine may go on over memory.
 pub const VERSION: u16 = 17;
 
 /// Most characters of a host's name.

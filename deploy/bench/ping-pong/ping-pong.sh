@@ -92,9 +92,10 @@ run() {
             timeout 300 taskset -c "$2" ./pvm "${1#pvm-}" near
             wait "$far"
             ;;
-        bolide | bolide-tls)
-            local certs=()
-            [ "$1" = bolide ] || certs=(--certs certs/pc)
+        bolide | bolide-tls | bolide-memory)
+            local certs=() stay=(--no-shared-memory)
+            [ "$1" != bolide-tls ] || certs=(--certs certs/pc)
+            [ "$1" != bolide-memory ] || stay=()
             : > far.txt
             timeout 300 taskset -c "$3" ./bolide bench messages --listen 127.0.0.1:0 "${certs[@]}" > far.txt &
             far=$!
@@ -102,7 +103,7 @@ run() {
                 kill -0 "$far" || return 1
                 sleep 0.01
             done
-            timeout 300 taskset -c "$2" ./bolide bench messages --rounds 1 "${certs[@]}" \
+            timeout 300 taskset -c "$2" ./bolide bench messages --rounds 1 "${certs[@]}" "${stay[@]}" \
                 --to "$(sed 's/listening on //' far.txt)" | awk '$2 == "frame" { print $1, $4 }'
             wait "$far"
             ;;
@@ -117,7 +118,7 @@ until [ -e "pvmd.$(id -u).$PVM_VMID" ]; do
     sleep 0.05
 done
 
-programs=(openmpi pvm-default pvm-direct bolide bolide-tls)
+programs=(openmpi pvm-default pvm-direct bolide bolide-tls bolide-memory)
 for round in $(seq "$rounds"); do
     for placement in apart together; do
         near=${processors[0]}
@@ -159,7 +160,7 @@ awk -v rounds="$rounds" -v programs="${programs[*]}" '
                 printf "  %11.2f  %11.2f\n", us[place, "openmpi", size[i]] / own, pvm / own
             }
         }
-        print "\nrate/MPI, rate/PVM: of bolide without TLS, by OpenMPI and by the better of the two routes of PVM"
+        print "\nrate/MPI, rate/PVM: of bolide over TCP without TLS, by OpenMPI and by the better of the two routes of PVM"
     }' medians.txt
 
 awk -v rounds="$rounds" '
