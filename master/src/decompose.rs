@@ -63,8 +63,7 @@ pub fn decompose(mesh: &Mesh, speeds: &[f64], costs: Costs, alive: Option<&[bool
                 }
                 let finish = if costs.message > 0.0 {
                     let shared = Shared::new(&subdomains, speeds.len());
-                    slowest(&shared.add_messages(work, costs.message), speeds)
-                        .max(shared.on_a_wire(costs.byte))
+                    shared.slowest(&shared.add_messages(work, costs.message), speeds, costs.byte)
                 } else {
                     finish
                 };
@@ -132,9 +131,14 @@ impl Shared {
         work
     }
 
-    /// The longest that a host's wire is busy in one direction, with a force of three numbers by node.
-    fn on_a_wire(&self, byte: f64) -> f64 {
-        24.0 * byte * self.nodes.iter().copied().fold(0.0, f64::max)
+    /// The last finish, with partial forces of three numbers by node on a wire in each direction: they travel while elements are computed
+    /// that touch no other worker's, of which there are fewer by about the shared nodes.
+    fn slowest(&self, work: &[f64], speeds: &[f64], byte: f64) -> f64 {
+        let finish = |((work, speed), nodes): ((&f64, &f64), &f64)| {
+            let beside = (work - nodes).max(0.0) / speed;
+            work / speed + (24.0 * byte * nodes - beside).max(0.0)
+        };
+        work.iter().zip(speeds).zip(&self.nodes).map(finish).fold(0.0, f64::max)
     }
 }
 
