@@ -283,7 +283,7 @@ async fn stay(process: Process, mut hello: Hello, slot: Slot) -> std::result::Re
                 info!(
                     host = call.welcome.host,
                     incarnation = call.welcome.incarnation,
-                    shares_memory = call.shares_memory,
+                    shares_memory = call.shares_memory.then_some(true),
                     "joined {}",
                     options.master
                 );
