@@ -87,6 +87,9 @@ fn slowest(work: &[f64], speeds: &[f64]) -> f64 {
     work.iter().zip(speeds).map(|(w, s)| w / s).fold(0.0, f64::max)
 }
 
+/// How much longer than its bytes an exchange takes: frames of several neighbours follow each other, and both sides wait for the last.
+const WIRE: f64 = 2.0;
+
 /// What workers share in structured parts.
 struct Shared {
     /// By worker: others with which it shares nodes.
@@ -136,7 +139,7 @@ impl Shared {
     fn slowest(&self, work: &[f64], speeds: &[f64], byte: f64) -> f64 {
         let finish = |((work, speed), nodes): ((&f64, &f64), &f64)| {
             let beside = (work - nodes).max(0.0) / speed;
-            work / speed + (24.0 * byte * nodes - beside).max(0.0)
+            work / speed + (WIRE * 24.0 * byte * nodes - beside).max(0.0)
         };
         work.iter().zip(speeds).zip(&self.nodes).map(finish).fold(0.0, f64::max)
     }

@@ -153,8 +153,8 @@ fn slow_wires_keep_blocks_with_few_shared_nodes() {
     };
     assert!(shared(0.17) < shared(0.0), "{} at 1 Gb/s, {} without a wire", shared(0.17), shared(0.0));
     let half = Shared { neighbours: vec![1], nodes: vec![100.0] };
-    assert_eq!(half.slowest(&[1000.0], &[1.0], 0.25), 1000.0, "600 beside 900 elements");
-    assert_eq!(half.slowest(&[1000.0], &[2.0], 0.25), 500.0 + 600.0 - 450.0);
+    assert_eq!(half.slowest(&[1000.0], &[1.0], 0.125), 1000.0, "600 beside 900 elements");
+    assert_eq!(half.slowest(&[1000.0], &[2.0], 0.125), 500.0 + 600.0 - 450.0);
     let halves = [[0, 50], [50, 100]].map(|[low, high]| Cells { low: [low, 0, 0], high: [high, 9, 4] });
     assert_eq!(halves[0].nodes_shared_with(&halves[1]), 50.0);
     let apart = Cells { low: [51, 0, 0], high: [60, 9, 4] };
