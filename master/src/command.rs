@@ -11,7 +11,7 @@ use std::{net::SocketAddr, path::PathBuf};
 use clap::{Args, Parser, Subcommand, builder::PossibleValuesParser};
 use deck::{model::FORMAT_NAMES, refine::MAX_FACTOR};
 use protocol::{
-    options::{self, ADVANCED, Balance, JobOptions, Route},
+    options::{self, ADVANCED, Balance, JobOptions, Route, SortBy},
     shape::Rate,
 };
 use worker::{owner::hours::Hours, processors::Processors};
@@ -337,6 +337,9 @@ pub struct SimulateArgs {
     /// Speeds by which work is distributed, in a run of one deck
     #[arg(long, value_enum, default_value = "given", conflicts_with = "table")]
     pub balance: Balance,
+    /// Who sorts the contact surface, in a run of one deck
+    #[arg(long, value_enum, default_value = "auto", conflicts_with = "table")]
+    pub sort_by: SortBy,
     /// Folder for pictures and the trace; without it none are drawn
     #[arg(long)]
     pub out: Option<PathBuf>,

@@ -31,7 +31,7 @@ use crate::{
     job::Job,
     pace::{Pace, Waiting},
     peers,
-    sort::{Gathered, SortBasis, Sorted},
+    sort::{Gathered, SortBasis, Sorted, What},
 };
 use worker_link::Member;
 pub use worker_link::{Delivery, WorkerLink};
@@ -516,9 +516,13 @@ impl Driver {
 
     fn sort(&self, bench: Arc<SortBasis>, x: Gathered) {
         let (send, failed) = (self.send.clone(), self.send.clone());
-        // On a thread of the lowest priority: a worker on this host computes first, the sort takes what is idle.
+        // A sort of all is on a thread of the lowest priority: a worker on this host computes first, the sort takes what is idle. For
+        // plans of what they have sorted themselves, workers wait.
+        let is_long = matches!(x.what, What::Positions(_));
         let work = move || {
-            lowest_priority();
+            if is_long {
+                lowest_priority();
+            }
             let sorted = catch_unwind(AssertUnwindSafe(|| timed_sort(&bench, &x)));
             let sorted = sorted.map_err(|_| "a bug in the sort; the log has its words".to_owned());
             // The receiver is gone only when the job is over.

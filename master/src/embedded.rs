@@ -95,7 +95,7 @@ enum Arrival {
 }
 
 /// Elements from which on a message is handed over as it is.
-const WHOLE: usize = 50_000;
+pub const WHOLE: usize = 50_000;
 
 /// A worker in this process.
 struct LocalWorker {

@@ -6,13 +6,13 @@
 
 use mechanics::{
     contact::Batch,
-    cycle::{Ghost, Plan},
+    cycle::{Added, Ghost, Handed, Plan},
     state::GlobalState,
 };
 
 use protocol::options::Route;
 
-use crate::node_owners::{NodeOwners, Standing, share};
+use crate::node_owners::NodeOwners;
 
 /// The exchange of all workers from one plan boundary to the next.
 #[derive(Clone)]
@@ -42,6 +42,28 @@ impl Exchange {
         state: &GlobalState,
         route: Route,
     ) -> Self {
+        let global = |batch: &Batch| batch.nodes.iter().map(|node| node.global).collect();
+        let ghosts = (0..).zip(&batches).map(|(worker, batch): (u32, &Option<Batch>)| {
+            let mut nodes: Vec<u32> = batch.as_ref().map(global).unwrap_or_default();
+            nodes.retain(|&node| !node_owners.holds(worker, node));
+            nodes
+        });
+        let ghosts: Vec<Vec<u32>> = ghosts.collect();
+        let mut exchange = Self::with_ghosts(node_owners, &ghosts, state, (route, true));
+        for (plan, batch) in exchange.plans.iter_mut().zip(batches) {
+            plan.batch = batch;
+        }
+        exchange
+    }
+
+    /// Plans for these ghosts by worker, ascending nodes that it does not hold, without batches. Where they are not to be `whole`, which is
+    /// on route direct, they say only what ghosts add to the exchange that stands.
+    pub fn with_ghosts(
+        node_owners: &NodeOwners,
+        ghosts_of: &[Vec<u32>],
+        state: &GlobalState,
+        (route, whole): (Route, bool),
+    ) -> Self {
         let moments = !state.shells.inertia.is_empty();
         let n_history = state.contact.len();
         let stride = (if moments { 6 } else { 3 }) + n_history;
@@ -49,29 +71,37 @@ impl Exchange {
         let mut plans: Vec<Plan> = vec![empty; node_owners.n_workers()];
         // Ghosts: node and worker.
         let mut ghosts: Vec<(u32, u32)> = Vec::new();
-        for (worker, batch) in (0..).zip(&batches) {
-            let nodes = batch.iter().flat_map(|batch| &batch.nodes).map(|node| node.global);
-            ghosts.extend(nodes.filter(|&node| !node_owners.holds(worker, node)).map(|node| (node, worker)));
+        for (worker, nodes) in (0..).zip(ghosts_of) {
+            ghosts.extend(nodes.iter().map(|&node| (node, worker)));
         }
         ghosts.sort_unstable();
         let mut added = vec![Added::default(); plans.len()];
+        // On route master: added nodes and their slots.
+        let mut new_slots: Vec<Vec<(u32, u32)>> = vec![Vec::new(); plans.len()];
         let mut n_slots = node_owners.n_shared() as u32;
         for ghosts in ghosts.chunk_by(|one, other| one.0 == other.0) {
             let node = ghosts[0].0;
             let owner = node_owners.owner_worker[node as usize];
             plans[owner as usize].send.push(node);
-            let slot = node_owners.slot(node).unwrap_or_else(|| {
-                added[owner as usize].nodes.push((node, n_slots));
-                n_slots += 1;
-                n_slots - 1
-            });
+            let stands = node_owners.has_several(node);
+            if !stands {
+                added[owner as usize].nodes.push(node);
+            }
+            if route == Route::Master {
+                let slot = node_owners.slot(node).unwrap_or(n_slots);
+                if !stands {
+                    new_slots[owner as usize].push((node, slot));
+                    n_slots += 1;
+                }
+                ghosts.iter().for_each(|&(_, ghost)| new_slots[ghost as usize].push((node, slot)));
+            }
             for &(_, ghost) in ghosts {
                 plans[ghost as usize].ghosts.push(Ghost {
                     node,
                     mass: state.mass[node as usize],
                     constraint: state.constraint[node as usize],
                 });
-                added[ghost as usize].nodes.push((node, slot));
+                added[ghost as usize].nodes.push(node);
                 for holder in node_owners.holders(node) {
                     added[ghost as usize].with.push((node, holder));
                     added[holder as usize].with.push((node, ghost));
@@ -80,14 +110,21 @@ impl Exchange {
                 added[ghost as usize].with.extend(others);
             }
         }
-        let mut slots = Vec::with_capacity(plans.len());
-        for (plan, (standing, added)) in plans.iter_mut().zip(node_owners.standing.iter().zip(added)) {
-            let whole = added.to(standing, route);
-            plan.exchange = whole.nodes;
-            plan.neighbours = whole.neighbours;
-            slots.push(whole.slots);
+        let mut slots = vec![Vec::new(); plans.len()];
+        for (worker, (plan, added)) in plans.iter_mut().zip(added).enumerate() {
+            if !whole {
+                plan.added = Some(added);
+                continue;
+            }
+            let standing = &node_owners.standing[worker];
+            (plan.exchange, plan.neighbours) = standing.with(&added);
+            if route == Route::Master {
+                let stand = (&standing.nodes[..], &node_owners.slots[worker][..]);
+                slots[worker] = slots_of(&plan.exchange, stand, &new_slots[worker]);
+                plan.neighbours.clear();
+            }
         }
-        let sources = plans
+        let sources: Vec<Vec<(u32, u32)>> = plans
             .iter()
             .map(|plan| {
                 plan.ghosts
@@ -100,8 +137,8 @@ impl Exchange {
                     .collect()
             })
             .collect();
-        for (plan, batch) in plans.iter_mut().zip(batches) {
-            plan.batch = batch;
+        if route == Route::Direct {
+            hand_over(&mut plans, &sources);
         }
         let hash = hash(&plans);
         Self { plans, hash, route, stride, n_history, n_slots: n_slots as usize, slots, sources }
@@ -173,55 +210,32 @@ impl Exchange {
     }
 }
 
-/// What the ghosts of a plan add to the exchange of a worker.
-#[derive(Clone, Default)]
-struct Added {
-    /// Nodes and their slots, ascending.
-    nodes: Vec<(u32, u32)>,
-    /// Nodes and a worker that has each too.
-    with: Vec<(u32, u32)>,
+/// Says who gives whom the state of ghosts, from where each comes: worker and position in its send list.
+fn hand_over(plans: &mut [Plan], sources: &[Vec<(u32, u32)>]) {
+    let enter = |list: &mut Vec<Handed>, worker: u32, place: u32| match list
+        .iter_mut()
+        .find(|of| of.worker == worker)
+    {
+        Some(of) => of.places.push(place),
+        None => list.push(Handed { worker, places: vec![place] }),
+    };
+    for (worker, sources) in (0..).zip(sources) {
+        for (ghost, &(owner, at)) in (0..).zip(sources) {
+            enter(&mut plans[worker as usize].takes, owner, ghost);
+            enter(&mut plans[owner as usize].gives, worker, at);
+        }
+    }
 }
 
-impl Added {
-    /// The exchange of the worker: neighbours on route direct, slots on route master.
-    fn to(self, standing: &Standing, route: Route) -> Standing {
-        let n = standing.nodes.len() + self.nodes.len();
-        let mut whole = Standing { nodes: Vec::with_capacity(n), ..Standing::default() };
-        // Where a standing node has come to.
-        let mut places = Vec::with_capacity(standing.nodes.len());
-        let mut new = self.nodes.iter().peekable();
-        for (&node, &slot) in standing.nodes.iter().zip(&standing.slots) {
-            while let Some((node, slot)) = new.next_if(|new| new.0 < node) {
-                whole.nodes.push(*node);
-                whole.slots.push(*slot);
-            }
-            places.push(whole.nodes.len() as u32);
-            whole.nodes.push(node);
-            whole.slots.push(slot);
-        }
-        for (node, slot) in new {
-            whole.nodes.push(*node);
-            whole.slots.push(*slot);
-        }
-        if route == Route::Master {
-            return whole;
-        }
-        whole.slots.clear();
-        whole.neighbours.clone_from(&standing.neighbours);
-        for at in whole.neighbours.iter_mut().flat_map(|neighbour| &mut neighbour.shared) {
-            *at = places[*at as usize];
-        }
-        for &(node, worker) in &self.with {
-            let at = whole.nodes.partition_point(|&n| n < node) as u32;
-            share(&mut whole.neighbours, worker, at);
-        }
-        if !self.with.is_empty() {
-            // Two ascending runs, which the stable sort merges.
-            whole.neighbours.iter_mut().for_each(|neighbour| neighbour.shared.sort());
-            whole.neighbours.sort_unstable_by_key(|neighbour| neighbour.worker);
-        }
-        whole
-    }
+/// The slots of the nodes of an exchange: of those that stand, and of those that ghosts add.
+fn slots_of(exchange: &[u32], (standing, slots): (&[u32], &[u32]), added: &[(u32, u32)]) -> Vec<u32> {
+    let mut standing = standing.iter().zip(slots).peekable();
+    let mut added = added.iter().peekable();
+    let of_node = |node: &u32| {
+        let stands = standing.next_if(|(stands, _)| *stands == node).map(|(_, slot)| *slot);
+        stands.or_else(|| added.next_if(|(new, _)| new == node).map(|(_, slot)| *slot))
+    };
+    exchange.iter().filter_map(of_node).collect()
 }
 
 /// A 64-bit hash of the lists that the packed arrays follow: FNV-1a over words.
@@ -232,6 +246,7 @@ fn hash(plans: &[Plan]) -> u64 {
     for plan in plans {
         eat(plan.exchange.len() as u32);
         plan.exchange.iter().copied().for_each(&mut eat);
+        plan.added.iter().flat_map(|added| &added.nodes).copied().for_each(&mut eat);
         eat(plan.send.len() as u32);
         plan.send.iter().copied().for_each(&mut eat);
         eat(plan.ghosts.len() as u32);

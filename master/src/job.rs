@@ -6,7 +6,7 @@
 //! What it knows is in parts that know nothing of each other's insides, each tested by itself: `problem` is the same for the
 //! whole job; `workers`, `checkpoints`, `balancing`, the account (`verdict`) and the `tally` live as long as the job; an
 //! `epoch` has a `schedule`, `sorts`, frames of cycles (`frames`), `worker_states` and `samples`. Here they are brought
-//! together: this file takes events and completes cycles, `by_tree` those whose votes travel by a `tree`, `collect` what comes of states and samples, `deal` begins an epoch,
+//! together: this file takes events and completes cycles, `by_tree` those whose votes travel by a `tree`, `sorting` asks for sorts and sends plans, `collect` says what comes of states and samples, `deal` begins an epoch,
 //! `turnover` ends one.
 
 mod balancing;
@@ -22,6 +22,7 @@ mod numbers;
 mod problem;
 mod samples;
 mod schedule;
+mod sorting;
 mod sorts;
 mod tally;
 #[cfg(test)]
@@ -46,7 +47,6 @@ use crate::{
     event::{Action, Event, Outcome, Progress},
     options::SessionOptions,
     results::{history::HistoryRow, surface::Probe},
-    sort::{Gathered, Sorted},
 };
 use balancing::Balancing;
 use checkpoints::Checkpoints;
@@ -276,6 +276,9 @@ impl Job {
             ToMaster::Gathered { cycle, positions } => {
                 self.positions_arrived(worker, cycle, positions, actions)
             }
+            ToMaster::Sorted { gathered_at, sorted } => {
+                self.patch_sorted(worker, gathered_at, *sorted, actions)
+            }
             // Whoever drives the session waits for it.
             ToMaster::At { .. } => Ok(()),
             ToMaster::Relay { to, message } => {
@@ -443,16 +446,6 @@ impl Job {
         due || self.options.asked.snapshot_at == Some(cycle)
     }
 
-    /// Whether positions travel at the start of cycle `cycle`, so that a sort acts a lag later.
-    fn sort_due(&self, cycle: u64, vote: Option<&Vote>) -> bool {
-        let setup = &self.problem.model.setup;
-        let Some(settings) = &setup.contact else { return false };
-        let forced = self.options.asked.forces_sort(cycle);
-        let completed = self.epoch.schedule.completed();
-        let lag = u64::from(setup.control.sort_lag);
-        self.epoch.sorts.is_due(cycle, completed, vote, (settings, lag, forced))
-    }
-
     /// A frame of a cycle has come.
     fn arrived(
         &mut self,
@@ -549,49 +542,6 @@ impl Job {
         self.begin_sort(cycle, &frames.gathered, actions)?;
         let limit = next.limit;
         actions.push(Action::Progress(Progress { cycle, time: now.time, dt: now.dt, element, limit }));
-        Ok(())
-    }
-
-    /// Asks for the sort of the positions that came with the frames of a cycle, if they were gathered for one.
-    fn begin_sort(
-        &mut self,
-        cycle: u64,
-        gathered: &[Vec<f64>],
-        actions: &mut Vec<Action>,
-    ) -> Result<(), Error> {
-        let Some(basis) = self.epoch.sorts.basis_for(&self.problem.model, cycle) else { return Ok(()) };
-        for (worker, numbers) in gathered.iter().enumerate() {
-            let (numbers, expected) = (numbers.len(), basis.sorter.n_gathered(worker));
-            if numbers != expected {
-                return Err(Error::Worker(worker, Breach::Gathered { numbers, expected }));
-            }
-        }
-        let x = basis.sorter.positions(gathered);
-        actions.push(Action::Sort(basis, Gathered { cycle, x }));
-        Ok(())
-    }
-
-    /// A sort is done: its plan goes to the workers and acts a lag after the gathering. One of an older epoch is of no
-    /// use any more.
-    fn sorted(&mut self, sorted: Sorted, actions: &mut Vec<Action>) -> Result<(), Error> {
-        if sorted.epoch < self.epoch.number {
-            return Ok(());
-        }
-        for sorts::Done { gathered, acts_at, sorted } in self.epoch.sorts.done(sorted)? {
-            let census = sorted.census;
-            let exchange = Arc::new(sorted.exchange);
-            self.epoch.send_all(actions, |worker| {
-                let plan = Box::new(exchange.plans[worker].clone());
-                ToWorker::Plan { gathered_at: gathered, acts_at, plan, hash: exchange.hash }
-            });
-            self.epoch.sorts.act(gathered, acts_at, exchange, census);
-            // A late sort: the cycles before its own are complete, and workers wait for the plan. It is in force from here,
-            // as it would be had it come in time, so that the cycles of further sorts do not depend on how long this one took.
-            let completed = self.epoch.schedule.completed();
-            if acts_at <= completed {
-                self.retire(completed - 1);
-            }
-        }
         Ok(())
     }
 }

@@ -48,6 +48,7 @@ pub mod notify;
 pub mod options;
 pub mod output;
 pub mod pace;
+pub mod patches;
 pub mod peers;
 pub mod picture;
 pub mod places;

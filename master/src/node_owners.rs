@@ -2,7 +2,10 @@
 
 use std::collections::HashMap;
 
-use mechanics::{cycle::Neighbour, rigid};
+use mechanics::{
+    cycle::{Standing, standing::share},
+    rigid,
+};
 
 use crate::decompose::Subdomain;
 
@@ -20,17 +23,8 @@ pub struct NodeOwners {
     shared: Vec<u32>,
     /// By worker: what of the exchange stays the same in all plans.
     pub standing: Vec<Standing>,
-}
-
-/// The nodes that a worker's sub-domains share with others.
-#[derive(Clone, Default)]
-pub struct Standing {
-    /// Global node indices, ascending, and behind them the entries of rigid bodies.
-    pub nodes: Vec<u32>,
-    /// Place of each among the nodes that several workers hold.
-    pub slots: Vec<u32>,
-    /// Who has which of them, by worker.
-    pub neighbours: Vec<Neighbour>,
+    /// By worker: the place of each of those nodes among the nodes that several workers hold.
+    pub slots: Vec<Vec<u32>>,
 }
 
 impl NodeOwners {
@@ -56,9 +50,16 @@ impl NodeOwners {
         }
         let mut shared: Vec<u32> = others.keys().copied().collect();
         shared.sort_unstable();
-        let mut node_owners =
-            Self { owner_subdomain, owner_worker, standing: Vec::new(), work, others, shared };
-        node_owners.standing = node_owners.stand();
+        let mut node_owners = Self {
+            owner_subdomain,
+            owner_worker,
+            standing: Vec::new(),
+            slots: Vec::new(),
+            work,
+            others,
+            shared,
+        };
+        node_owners.stand();
         node_owners
     }
 
@@ -72,10 +73,10 @@ impl NodeOwners {
         for entry in rigid::entries(n) {
             let slot = self.shared.len() as u32;
             self.shared.push(entry);
-            for (worker, stand) in (0..).zip(&mut self.standing) {
+            for (worker, (stand, slots)) in (0..).zip(self.standing.iter_mut().zip(&mut self.slots)) {
                 let at = stand.nodes.len() as u32;
                 stand.nodes.push(entry);
-                stand.slots.push(slot);
+                slots.push(slot);
                 for other in (0..n_workers).filter(|&other| other != worker) {
                     share(&mut stand.neighbours, other, at);
                 }
@@ -87,14 +88,15 @@ impl NodeOwners {
         self
     }
 
-    fn stand(&self) -> Vec<Standing> {
+    fn stand(&mut self) {
         let mut standing = vec![Standing::default(); self.work.len()];
+        let mut slots = vec![Vec::new(); self.work.len()];
         for (slot, &node) in self.shared.iter().enumerate() {
             for worker in self.holders(node) {
                 let stand = &mut standing[worker as usize];
                 let at = stand.nodes.len() as u32;
                 stand.nodes.push(node);
-                stand.slots.push(slot as u32);
+                slots[worker as usize].push(slot as u32);
                 for other in self.holders(node).filter(|&other| other != worker) {
                     share(&mut stand.neighbours, other, at);
                 }
@@ -103,7 +105,7 @@ impl NodeOwners {
         for stand in &mut standing {
             stand.neighbours.sort_unstable_by_key(|neighbour| neighbour.worker);
         }
-        standing
+        (self.standing, self.slots) = (standing, slots);
     }
 
     pub fn n_workers(&self) -> usize {
@@ -120,6 +122,11 @@ impl NodeOwners {
         self.shared.binary_search(&node).ok().map(|slot| slot as u32)
     }
 
+    /// Whether sub-domains of several workers have the node.
+    pub fn has_several(&self, node: u32) -> bool {
+        self.others.contains_key(&node)
+    }
+
     /// Workers whose sub-domains have the node, its owner first.
     pub fn holders(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
         let others = self.others.get(&node).map_or(&[][..], Vec::as_slice);
@@ -129,13 +136,5 @@ impl NodeOwners {
     /// Whether a sub-domain of the worker has the node.
     pub fn holds(&self, worker: u32, node: u32) -> bool {
         self.holders(node).any(|holder| holder == worker)
-    }
-}
-
-/// Enters a place in the list shared with a worker.
-pub fn share(neighbours: &mut Vec<Neighbour>, worker: u32, at: u32) {
-    match neighbours.iter_mut().find(|neighbour| neighbour.worker == worker) {
-        Some(neighbour) => neighbour.shared.push(at),
-        None => neighbours.push(Neighbour { worker, shared: vec![at] }),
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use deck::model::Model;
-use protocol::options::{JobOptions, Route};
+use protocol::options::{Balance, JobOptions, Route};
 
 use crate::{
     balance::{Costs, Dealing},
@@ -57,6 +57,12 @@ impl SessionOptions {
     /// How partial forces travel.
     pub fn route(&self) -> Route {
         self.asked.route.unwrap_or_default()
+    }
+
+    /// Whether votes of so many workers travel by a tree: not through the master, and not where it looks at the vote or the times of each.
+    pub fn has_tree(&self, workers: usize) -> bool {
+        let looks = self.asked.verify > 0.0 || self.asked.balance == Balance::Measured;
+        self.route() == Route::Direct && !looks && workers >= self.tree.from
     }
 
     /// What work costs; how a part is cut changes the number of messages on route direct only.

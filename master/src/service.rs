@@ -29,7 +29,7 @@ use crate::{
     notice::Notice,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Output, progress_line},
-    picture,
+    patches, picture,
     queue::Change,
     results::{self, Folder, Summary, TRACE, formats, report, summary::Origin, trace},
     snapshot::{Snapshot, keeper::Keeper, store::Store},
@@ -133,14 +133,18 @@ fn is_here(address: &str) -> bool {
     ip.is_ok_and(|ip| ip.is_loopback() || UdpSocket::bind((ip, 0)).is_ok())
 }
 
-/// Workers on this machine are dealt less, for sorts run beside them ([`balance::beside_sorts`]).
-fn share_with_sorts(model: &Model, specs: &mut [WorkerSpec], beside: &[bool]) {
+/// Workers on this machine are dealt less where the master's sorts run beside them ([`balance::beside_sorts`]).
+fn share_with_sorts(model: &Model, options: &SessionOptions, specs: &mut [WorkerSpec], beside: &[bool]) {
     if model.setup.contact.is_none() || !beside.contains(&true) {
         return;
     }
     let surface = Surface::new(&model.mesh, &model.setup.materials, &|_| true);
     let speeds: Vec<f64> = specs.iter().map(|spec| spec.speed).collect();
-    let sort = balance::SORT_ELEMENTS * surface.nodes.len() as f64;
+    let n_nodes = surface.nodes.len() as f64;
+    if patches::are_sorted_by_workers(model, options, &speeds, n_nodes) {
+        return;
+    }
+    let sort = balance::SORT_ELEMENTS * n_nodes;
     let elements = model.mesh.n_elements() as f64;
     let lag = model.setup.control.sort_lag;
     let left = balance::beside_sorts(&speeds, beside, elements, sort, lag);
@@ -157,7 +161,6 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     let mut specs: Vec<_> = order.worker_links.iter().map(|worker_link| worker_link.spec.clone()).collect();
     let beside: Vec<bool> =
         order.worker_links.iter().map(|worker_link| is_here(&worker_link.address)).collect();
-    share_with_sorts(&model, &mut specs, &beside);
     let all_take_peers = order.worker_links.iter().all(|worker_link| worker_link.peer.is_some());
     let interval = interval_for(&order.options, &model, Some(SNAPSHOT_SECONDS));
     let keep = CheckpointEvery::for_both(order.options.keep_every, interval);
@@ -165,6 +168,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     let workers = order.workers_there.max(order.at_work_before.unwrap_or_default());
     let options = SessionOptions::of(&order.options, workers, all_take_peers);
     let options = SessionOptions { waits: true, keep, store: true, replay: true, ..options };
+    share_with_sorts(&model, &options, &mut specs, &beside);
     if let Some(path) = order.folder.as_ref().filter(|path| path.is_symlink()) {
         let reason = format!("{} is a link; results stay in the spool folder, remove it", path.display());
         return Err(Failure::Job(reason));

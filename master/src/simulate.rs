@@ -197,22 +197,17 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
     };
     let costs = calibrate::costs(cluster, &benchmarks, 1.0);
     let work = calibrate::work(&model, cluster)?;
+    let route = Route::choose(args.route, cluster.speeds.len(), true);
+    let scheme = Scheme { balance: args.balance, sort_by: args.sort_by, ..Scheme::bolide(route) };
+    let dealt_by = costs.relative(&cluster.network);
     let machines = Machines {
-        believed: calibrate::believed(
-            &cluster.speeds,
-            &costs,
-            &work,
-            calibrate::surface_nodes(&model),
-            model.setup.control.sort_lag,
-        ),
+        believed: calibrate::believed(&model, (&cluster.speeds, &scheme), (&costs, dealt_by), &work),
         speeds: cluster.speeds.clone(),
         costs,
-        dealt_by: costs.relative(&cluster.network),
+        dealt_by,
         network: cluster.network.clone(),
         changes: cluster.changes.clone(),
     };
-    let route = Route::choose(args.route, cluster.speeds.len(), true);
-    let scheme = Scheme { balance: args.balance, ..Scheme::bolide(route) };
     let bound = calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>();
     let (timeline, _) = virtual_clock::run(&model, &machines, scheme, None)?;
     let window = timeline.window();

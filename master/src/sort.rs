@@ -1,4 +1,4 @@
-//! Sort: from gathered positions to the next plan. Pure computation, run beside the cycles.
+//! Sort: from gathered positions, or from what workers have sorted, to the next plan. Pure computation, run beside the cycles.
 //!
 //! The sort itself is mechanics'; here its units are dealt to workers and become batches and an exchange.
 
@@ -9,13 +9,17 @@ use mechanics::{
     state::GlobalState,
 };
 
-use protocol::options::Route;
+use protocol::{
+    message::{Around, SortedPatch},
+    options::Route,
+};
 use tracing::trace;
 
 use crate::{
     balance::{self, Costs, Dealing},
     exchange::Exchange,
     node_owners::NodeOwners,
+    patches,
 };
 
 /// All that a sort needs and that stays the same between two decompositions.
@@ -32,18 +36,28 @@ pub struct Sorter {
     gather: Vec<Vec<u32>>,
 }
 
-/// Positions that a sort works on.
+/// What a sort works on.
 pub struct Gathered {
-    /// The cycle at whose start they are.
+    /// The cycle at whose start positions are.
     pub cycle: u64,
-    /// By surface node (length).
-    pub x: Vec<[f64; 3]>,
+    pub what: What,
+}
+
+/// What comes of a gathering.
+pub enum What {
+    /// Positions by surface node (length).
+    Positions(Vec<[f64; 3]>),
+    /// What workers made of their patches, by worker.
+    Patches(Vec<SortedPatch>),
 }
 
 impl Gathered {
-    /// Number of surface nodes.
+    /// Number of surface nodes that the master sorts, or of ghosts that workers ask for.
     pub fn n_nodes(&self) -> usize {
-        self.x.len()
+        match &self.what {
+            What::Positions(x) => x.len(),
+            What::Patches(patches) => patches.iter().map(|patch| patch.ghosts.len()).sum(),
+        }
     }
 }
 
@@ -60,6 +74,8 @@ pub struct Sorted {
     pub census: Census,
     /// Interactions by worker.
     pub interactions: Vec<u64>,
+    /// By worker, where workers sort themselves: whose patches are near.
+    pub around: Vec<Vec<Around>>,
 }
 
 impl Sorter {
@@ -100,6 +116,15 @@ impl Sorter {
         &self.surface
     }
 
+    pub fn exclusions(&self) -> &Exclusions {
+        &self.exclusions
+    }
+
+    /// Number of parts of the problem.
+    pub fn n_parts(&self) -> usize {
+        self.settings.n_parts()
+    }
+
     /// Numbers that a worker's gathering has.
     pub fn n_gathered(&self, worker: usize) -> usize {
         3 * self.gather[worker].len()
@@ -123,7 +148,10 @@ impl Sorter {
 
     /// Sorts, balances, plans. `x` by surface node; of `state` only masses and constraints are read.
     pub fn run(&self, epoch: u32, of: &Gathered, node_owners: &NodeOwners, state: &GlobalState) -> Sorted {
-        let x = &of.x;
+        let x = match &of.what {
+            What::Positions(x) => x,
+            What::Patches(patches) => return self.plan(epoch, of.cycle, patches, node_owners, state),
+        };
         let mut units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
         let census = Census::of(&units);
         let owner = |node: u32| node_owners.owner_worker[self.surface.nodes[node as usize] as usize] as usize;
@@ -149,7 +177,30 @@ impl Sorter {
             })
             .collect();
         let exchange = Exchange::new(node_owners, batches, state, self.route);
-        Sorted { epoch, gathered: of.cycle, exchange, census, interactions }
+        Sorted { epoch, gathered: of.cycle, exchange, census, interactions, around: Vec::new() }
+    }
+
+    /// The plan that follows from what workers have sorted.
+    fn plan(
+        &self,
+        epoch: u32,
+        gathered: u64,
+        patches: &[SortedPatch],
+        node_owners: &NodeOwners,
+        state: &GlobalState,
+    ) -> Sorted {
+        let mut census = Census::default();
+        patches.iter().for_each(|patch| census.merge(&patch.census));
+        let ghosts: Vec<Vec<u32>> = patches.iter().map(|patch| patch.ghosts.clone()).collect();
+        let boxes: Vec<_> = patches.iter().map(|patch| patch.boxes.clone()).collect();
+        Sorted {
+            epoch,
+            gathered,
+            exchange: Exchange::with_ghosts(node_owners, &ghosts, state, (self.route, false)),
+            census,
+            interactions: patches.iter().map(|patch| patch.census.interactions).collect(),
+            around: patches::around(&boxes, &self.settings),
+        }
     }
 }
 

@@ -32,7 +32,8 @@ use std::fmt;
 /// 15: relaxation has a rate.
 /// 16: shells of four points and membranes, thicknesses by shell, springs, cables, and pressures that move.
 /// 17: votes and orders travel by a tree; processes of one machine may go on over memory.
-pub const VERSION: u16 = 17;
+/// 18: workers may sort what they hold of the surface.
+pub const VERSION: u16 = 18;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

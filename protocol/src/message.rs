@@ -14,7 +14,8 @@
 //! cycle `n + 1` and what happens at the start of cycle `n + 2`.
 
 use mechanics::{
-    cycle::{Plan, Subdomain},
+    contact::{Census, PartBox, Patch, PlacedPatch},
+    cycle::{Plan, Standing, Subdomain},
     exact::{Quanta, Quantum},
     piece::Piece,
     rigid,
@@ -47,6 +48,8 @@ pub enum ToWorker {
         plan: Box<Plan>,
         /// Hash of the whole exchange plan; each frame of its cycles carries it.
         hash: u64,
+        /// Where workers [sort](Sorting) themselves, whose patches are near: the batch of the plan is the one that this worker has sorted.
+        around: Vec<Around>,
     },
     /// The answer to every worker's `Cycle` of one cycle.
     Totals {
@@ -56,7 +59,7 @@ pub enum ToWorker {
         /// Total forces of this worker's exchange nodes, three numbers each, and of its entries for rigid bodies.
         totals: Vec<f64>,
     },
-    /// State of the ghosts of a plan that starts to act, six numbers each.
+    /// On route master: state of the ghosts of a plan that starts to act, six numbers each.
     Transfer {
         /// The cycle at which the plan acts.
         cycle: u64,
@@ -129,6 +132,10 @@ pub enum Said {
     Votes(BranchVote),
     /// To a child in the tree: the orders that answer the cycle.
     Orders(Orders),
+    /// To a worker around, where the cycle gathers and workers [sort](Sorting) themselves: the faces that may be near its nodes.
+    Patch(PlacedPatch),
+    /// At the cycle where a plan starts to act: state of the ghosts that the sender owns, as in [`ToWorker::Transfer`].
+    Transfer(Vec<f64>),
 }
 
 /// The kinds of [`Said`].
@@ -137,6 +144,8 @@ pub enum SaidKind {
     Partials,
     Votes,
     Orders,
+    Patch,
+    Transfer,
 }
 
 /// What partial forces carry along for the tree.
@@ -176,17 +185,21 @@ impl Said {
             Self::Partials { .. } => SaidKind::Partials,
             Self::Votes(_) => SaidKind::Votes,
             Self::Orders(_) => SaidKind::Orders,
+            Self::Patch(_) => SaidKind::Patch,
+            Self::Transfer(_) => SaidKind::Transfer,
         }
     }
 
     /// Whether a worker in cycle `now` may hear this of `cycle`. Neighbours are at most a cycle apart. A vote is waited for by the
-    /// orders that both need two cycles later, and those go to workers that have sent theirs.
+    /// orders that both need two cycles later, and those go to workers that have sent theirs. Who sends a patch or the state of
+    /// ghosts is about to do what others need of its cycle, and any two workers are at most two cycles apart.
     pub const fn is_near(&self, cycle: u64, now: u64) -> bool {
         let ahead = cycle.wrapping_sub(now);
         match self.kind() {
             SaidKind::Partials => ahead <= 1,
             SaidKind::Votes => ahead.wrapping_add(1) <= 3,
             SaidKind::Orders => now.wrapping_sub(cycle) <= 1,
+            SaidKind::Patch | SaidKind::Transfer => ahead.wrapping_add(3) <= 5,
         }
     }
 
@@ -198,7 +211,7 @@ impl Said {
                 Aboard::Vote(votes) => Some(votes),
                 Aboard::Orders(_) => None,
             },
-            Self::Orders(_) => None,
+            Self::Orders(_) | Self::Patch(_) | Self::Transfer(_) => None,
         }
     }
 }
@@ -245,6 +258,47 @@ pub struct Assign {
     pub bodies: Vec<rigid::State>,
     /// How votes and orders travel; none where every worker exchanges them with the master itself.
     pub tree: Option<Tree>,
+    /// Where workers sort what they hold of the surface; none where the master sorts all.
+    pub sorting: Option<Box<Sorting>>,
+}
+
+/// What a worker needs to sort the nodes that it owns: against its own faces, and those that workers around send it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sorting {
+    /// What it holds of the surface.
+    pub patch: Patch,
+    /// Patch nodes that it sorts, ascending.
+    pub sorted: Vec<u32>,
+    /// Pairs (global node, face id) that never interact, of those nodes.
+    pub excluded: Vec<(u32, u32)>,
+    /// Whose patches are near by the positions at the start of the epoch.
+    pub around: Vec<Around>,
+    /// The exchange that ghosts of later plans add to.
+    pub standing: Standing,
+}
+
+/// A worker whose patch may come near, until the lists of another sort are in force.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Around {
+    /// Its index in the job.
+    pub worker: u32,
+    /// Where its patch was when positions were gathered for the lists in force.
+    pub boxes: Vec<PartBox>,
+}
+
+/// What came of a worker's sort, for the master to make plans of.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SortedPatch {
+    /// Global nodes of its units that none of its sub-domains has, ascending.
+    pub ghosts: Vec<u32>,
+    /// Surface nodes that it sorted, and all that it looked at, with those of other workers' faces.
+    pub nodes: [u64; 2],
+    /// Of its units.
+    pub census: Census,
+    /// Pairs that a cycle looks at.
+    pub weight: u64,
+    /// Where its patch was.
+    pub boxes: Vec<PartBox>,
 }
 
 /// What the next cycles do; the same on every worker.
@@ -313,6 +367,12 @@ pub enum ToMaster {
         /// Positions of owned surface nodes.
         positions: Vec<f64>,
     },
+    /// From each worker that sorts itself, once its patch is sorted.
+    Sorted {
+        /// The cycle whose positions it was sorted from.
+        gathered_at: u64,
+        sorted: Box<SortedPatch>,
+    },
     /// The answer to [`ToWorker::Where`].
     At {
         /// 0 without its domain, 1 when it is ready, `c + 2` when it has sent what others need of cycle `c`.
@@ -325,7 +385,7 @@ pub enum ToMaster {
         /// What to pass on.
         message: ToPeer,
     },
-    /// State of the nodes that others will have as ghosts.
+    /// On route master: state of the nodes that others will have as ghosts.
     Transfer {
         /// The cycle at which the plan acts.
         cycle: u64,

@@ -12,6 +12,18 @@ use clap::{
 use mechanics::lanes::Width;
 use serde::{Deserialize, Serialize};
 
+/// Who sorts the contact surface, where votes travel from worker to worker.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+pub enum SortBy {
+    /// The master if it is done within the lag of a sort, else the workers
+    #[default]
+    Auto,
+    /// The master, from positions of all
+    Master,
+    /// Each worker sorts what it holds
+    Workers,
+}
+
 /// How partial forces travel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Route {
@@ -179,6 +191,10 @@ pub struct JobOptions {
     /// Speeds by which work is distributed
     #[arg(long, help_heading = ADVANCED, value_enum, default_value = "given")]
     pub balance: Balance,
+    /// Who sorts the contact surface, on route direct from five workers on
+    #[arg(long, help_heading = ADVANCED, value_enum, default_value = "auto")]
+    #[serde(default)]
+    pub sort_by: SortBy,
     /// Keep a checkpoint in memory every this many seconds, to return to when a worker is lost; 0 for none beside those on disk
     #[arg(long, help_heading = ADVANCED, value_name = "SECONDS", default_value = "10", value_parser = period, allow_negative_numbers = true)]
     pub keep_every: std::option::Option<f64>,

@@ -3,7 +3,7 @@
 //! Large arrays (partial forces, totals, positions, states of ghosts) follow a small bincode head as raw little-endian
 //! `f64`; everything else is bincode throughout.
 
-use mechanics::vote::Vote;
+use mechanics::{contact::PlacedPatch, vote::Vote};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -80,6 +80,8 @@ enum SaidHead {
     Partials(Option<Box<Aboard>>),
     Votes(BranchVote),
     Orders(Orders),
+    Patch(PlacedPatch),
+    Transfer,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -210,6 +212,8 @@ pub fn pack_to_peer(message: &ToPeer) -> Result<Packed> {
         Said::Partials { partials, aboard } => (SaidHead::Partials(aboard.clone()), partials),
         Said::Votes(votes) => (SaidHead::Votes(votes.clone()), &[]),
         Said::Orders(orders) => (SaidHead::Orders(orders.clone()), &[]),
+        Said::Patch(patch) => (SaidHead::Patch(patch.clone()), &[]),
+        Said::Transfer(state) => (SaidHead::Transfer, state),
     };
     let head = codec::encode(&PeerHead { cycle, what })?;
     Ok(Packed { kind: Kind::Cycle, cycle, bytes: with_arrays(&head, &[numbers]) })
@@ -230,8 +234,10 @@ pub fn unpack_to_peer(kind: Kind, bytes: &[u8]) -> Result<ToPeer> {
         SaidHead::Partials(aboard) => {
             return Ok(ToPeer { cycle, what: Said::Partials { partials: numbers, aboard } });
         }
+        SaidHead::Transfer => return Ok(ToPeer { cycle, what: Said::Transfer(numbers) }),
         SaidHead::Votes(votes) => Said::Votes(votes),
         SaidHead::Orders(orders) => Said::Orders(orders),
+        SaidHead::Patch(patch) => Said::Patch(patch),
     };
     require_numbers(&numbers, 0)?;
     Ok(ToPeer { cycle, what })

@@ -83,6 +83,8 @@ pub fn compute(machine: &mut Machine, task: Task, cycle: u64) -> Outcome {
         Task::Integrate { .. } => "die-in-integrate",
         Task::WorkerState { .. } => "die-in-image",
         Task::Sample { .. } => "die-in-sample",
+        Task::Spread { .. } => "die-in-spread",
+        Task::Sort { .. } => "die-in-sort",
     };
     die(name);
     if matches!(task, Task::Load { .. }) && passes("stick-in-load") || in_cycle("stick", cycle) {

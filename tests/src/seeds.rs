@@ -567,10 +567,10 @@ impl Play {
             return Ok(());
         }
         let which = (message.what.kind(), message.cycle);
-        // Votes and orders follow no plan.
+        // The others follow no plan.
         let known = match which.0 {
             SaidKind::Partials => session.plan_at(message.cycle),
-            SaidKind::Votes | SaidKind::Orders => *plan,
+            SaidKind::Votes | SaidKind::Orders | SaidKind::Patch | SaidKind::Transfer => *plan,
         };
         let is_early = which.0 == SaidKind::Partials && known.is_none();
         if *epoch > session.epoch() || *epoch > pairs.0 || is_early {

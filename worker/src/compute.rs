@@ -21,6 +21,7 @@ use system::clock::thread_cpu_ns;
 
 use crate::{
     session::{Outcome, Task},
+    sorter::Sorter,
     stopwatch::Lap,
 };
 
@@ -91,6 +92,8 @@ fn gathered(domain: &mut Domain, gather: bool, blocking: bool, clock: &ThreadClo
 #[derive(Default)]
 pub struct Machine {
     domain: Option<Domain>,
+    /// Where this worker sorts what it holds.
+    sorter: Option<Sorter>,
     clock: ThreadClock,
     laps: Laps,
 }
@@ -172,6 +175,7 @@ impl Machine {
         }
         let (clock, laps) = (&self.clock, &mut self.laps);
         let domain = self.domain.as_mut().ok_or("a task without an assignment")?;
+        let sorter = || "a task of a sort where the master sorts".to_owned();
         Ok(match task {
             Task::Load { .. } => return Err("a second assignment".to_owned()),
             Task::Transfer { nodes } => {
@@ -182,9 +186,13 @@ impl Machine {
                 laps.time(Phase::Interior, || domain.elements(Sets::All, dt_previous, clock));
                 Outcome::Computed
             }
-            Task::Install { plan, ghost_state, dt_previous, gather, blocking } => {
+            Task::Install { mut plan, sorted, ghost_state, dt_previous, gather, blocking } => {
                 laps.time(Phase::Contact, || {
                     let (mark, dealt) = (clock.start(), clock.dealt_ns());
+                    if let Some((gathered_at, around)) = sorted {
+                        let sorter = self.sorter.as_mut().ok_or_else(sorter)?;
+                        sorter.complete(gathered_at, &around, &mut plan)?;
+                    }
                     domain.install(&plan, &ghost_state, clock)?;
                     // What was dealt has been booked.
                     clock.stop(mark + (clock.dealt_ns() - dealt), true);
@@ -218,6 +226,20 @@ impl Machine {
                 0 => Ok::<_, String>(Outcome::Sampled([0; 16])),
                 n => Ok(Outcome::Sampled(domain.sample(sampled_block(cycle, n))?)),
             })?,
+            Task::Spread { cycle } => laps.time(Phase::Contact, || {
+                let sorter = self.sorter.as_mut().ok_or_else(sorter)?;
+                let mark = clock.start();
+                let patches = sorter.spread(cycle, domain)?;
+                clock.stop(mark, true);
+                Ok::<_, String>(Outcome::Spread(patches))
+            })?,
+            Task::Sort { gathered_at, patches } => laps.time(Phase::Contact, || {
+                let sorter = self.sorter.as_mut().ok_or_else(sorter)?;
+                let mark = clock.start();
+                let sorted = Box::new(sorter.sort(gathered_at, &patches, domain)?);
+                clock.stop(mark, true);
+                Ok::<_, String>(Outcome::Sorted { gathered_at, sorted })
+            })?,
             Task::WorkerState { .. } => laps
                 .time(Phase::Other, || Outcome::WorkerState { pieces: domain.pieces(), work: clock.work() }),
         })
@@ -236,6 +258,8 @@ impl Machine {
         };
         // The domain of the epoch before goes first: there need not be room for two.
         let further_epoch = self.domain.take().is_some();
+        self.sorter = None;
+        let settings = assign.setup.contact.clone().filter(|_| assign.sorting.is_some());
         let mut domain = Domain::new(
             assign.setup,
             assign.n_parts as usize,
@@ -248,6 +272,9 @@ impl Machine {
         domain.watch(&assign.watched);
         domain.install(&assign.plan, &assign.ghost_state, &self.clock)?;
         let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
+        if let Some(sorting) = assign.sorting {
+            self.sorter = Some(Sorter::new(*sorting, settings.as_ref(), &domain)?);
+        }
         if !further_epoch {
             self.clock = ThreadClock::default();
         }

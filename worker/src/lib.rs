@@ -18,6 +18,7 @@ pub mod processors;
 pub mod runner;
 pub mod session;
 pub mod slots;
+pub mod sorter;
 pub mod stopwatch;
 
 /// A number that no other process draws: for nonces and tokens.

@@ -137,13 +137,16 @@ impl Runner {
                 if let Some(tree) = &assign.tree {
                     wanted.extend(tree.parent.iter().chain(tree.children.iter().map(|(child, _)| child)));
                 }
+                wanted.extend(assign.sorting.iter().flat_map(|sorting| &sorting.around).map(|a| a.worker));
                 self.links.want(wanted);
                 self.apply(Event::Message(ToWorker::Assign(assign)))
             }
-            ToWorker::Plan { gathered_at, acts_at, plan, hash } => {
-                let neighbours: Vec<u32> = plan.neighbours.iter().map(|n| n.worker).collect();
-                self.links.want(neighbours);
-                self.apply(Event::Message(ToWorker::Plan { gathered_at, acts_at, plan, hash }))?;
+            ToWorker::Plan { gathered_at, ref plan, ref around, .. } => {
+                let neighbours = plan.neighbours.iter().map(|n| n.worker);
+                let added = plan.added.iter().flat_map(|added| &added.with).map(|&(_, worker)| worker);
+                self.links.want(neighbours.chain(added).chain(around.iter().map(|a| a.worker)));
+                self.links.settle(gathered_at);
+                self.apply(Event::Message(message))?;
                 for step in self.links.release(&self.session) {
                     self.step(step)?;
                 }

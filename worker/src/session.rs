@@ -5,23 +5,23 @@
 //! is then thrown away, and the new domain is built when it has come. The steps of a cycle, in order: states if ordered; at a plan boundary transfer, all elements, install;
 //! else contact and border; send; interior; a sample if ordered; totals; integrate.
 
+mod boundary;
 mod event;
+mod sorts;
 mod totals;
 mod tree;
 
 use std::collections::{BTreeMap, VecDeque};
 
-use mechanics::{
-    cycle::{Neighbour, Plan},
-    exact::Quantum,
-    vote::Vote,
-};
+use mechanics::{cycle::Neighbour, exact::Quantum, vote::Vote};
 use protocol::{
     message::{Assign, Orders, ToMaster, ToWorker, WORKER_STATE_VERSION},
     options::Route,
 };
 
+use boundary::Coming;
 pub use event::{Action, Event, Outcome, Task};
+use sorts::Sorts;
 use totals::all_finite;
 use tree::Branch;
 
@@ -48,6 +48,11 @@ enum Phase {
     Interior,
     /// Waiting for totals or orders.
     AwaitTotals,
+    /// Spreading or sorting what it holds of the surface.
+    Sorting {
+        /// While a plan is awaited; else while totals or orders are.
+        at_boundary: bool,
+    },
     /// Hashing a sample, with all elements done.
     Sampling,
     /// After the last image: computing the elements of the cycle that will not be, for a sample of them.
@@ -85,10 +90,12 @@ pub struct Session {
     /// Orders by the cycle whose step they give.
     orders: BTreeMap<u64, Orders>,
     totals: VecDeque<(u64, Vec<f64>)>,
-    /// Cycles of gatherings and at which their plans act, and the plans that have come: cycle at which one acts, hash, plan.
+    /// Cycles of gatherings and at which their plans act, and the plans that have come.
     boundaries: VecDeque<(u64, u64)>,
-    plans: VecDeque<(u64, u64, Box<Plan>)>,
+    plans: VecDeque<Coming>,
+    /// State of ghosts that has come from the master, or on route direct from their owners, by (cycle, worker).
     ghosts: Option<(u64, Vec<f64>)>,
+    ghosts_heard: BTreeMap<(u64, u32), Vec<f64>>,
     n_exchange: usize,
     route: Route,
     neighbours: Vec<Neighbour>,
@@ -100,6 +107,8 @@ pub struct Session {
     plan_hash: u64,
     /// Where votes and orders travel by a tree.
     branch: Option<Branch>,
+    /// Where this worker sorts what it holds.
+    sorts: Option<Sorts>,
     vote: Option<Box<Vote>>,
     resumed: bool,
     imaged: bool,
@@ -135,6 +144,7 @@ impl Session {
             boundaries: VecDeque::new(),
             plans: VecDeque::new(),
             ghosts: None,
+            ghosts_heard: BTreeMap::new(),
             n_exchange: 0,
             route: Route::Master,
             neighbours: Vec::new(),
@@ -143,6 +153,7 @@ impl Session {
             heard: BTreeMap::new(),
             plan_hash: 0,
             branch: None,
+            sorts: None,
             vote: None,
             resumed: false,
             imaged: false,
@@ -170,9 +181,12 @@ impl Session {
         match self.phase {
             Phase::Idle | Phase::Loading => 0,
             Phase::Ready => 1,
-            Phase::Interior | Phase::AwaitTotals | Phase::Sampling | Phase::Integrating | Phase::Over => {
-                position_after(self.cycle)
-            }
+            Phase::Interior
+            | Phase::AwaitTotals
+            | Phase::Sorting { at_boundary: false }
+            | Phase::Sampling
+            | Phase::Integrating
+            | Phase::Over => position_after(self.cycle),
             _ => self.cycle + 1,
         }
     }
@@ -187,7 +201,7 @@ impl Session {
         match self.boundaries.iter().rev().find(|(_, acts_at)| *acts_at <= cycle) {
             None => Some(self.plan_hash),
             Some((_, boundary)) => {
-                self.plans.iter().find(|(acts_at, ..)| acts_at == boundary).map(|(_, hash, _)| *hash)
+                self.plans.iter().find(|plan| plan.acts_at == *boundary).map(|plan| plan.hash)
             }
         }
     }
@@ -277,6 +291,7 @@ impl Session {
                 self.plan_hash = assign.plan_hash;
                 let n_parts = assign.n_parts as usize;
                 self.branch = assign.tree.clone().map(|place| Branch::new(place, n_parts));
+                self.sorts = assign.sorting.as_ref().map(|sorting| Sorts::new(n_parts, sorting));
                 self.resumed = assign.cycle > 0;
                 if self.busy {
                     self.next = Some(assign);
@@ -308,11 +323,11 @@ impl Session {
             {
                 Ok(())
             }
-            ToWorker::Plan { acts_at, plan, hash, .. } => {
+            ToWorker::Plan { gathered_at, acts_at, plan, hash, around } => {
                 if self.plans.len() as u64 > self.sort_lag + 1 {
                     return Err(format!("plan for cycle {acts_at} while {} others wait", self.plans.len()));
                 }
-                self.plans.push_back((acts_at, hash, plan));
+                self.plans.push_back(Coming { gathered_at, acts_at, hash, plan, around });
                 self.resume_waiting(actions)
             }
             ToWorker::Transfer { cycle, state } => {
@@ -333,6 +348,11 @@ impl Session {
                 self.resume_waiting(actions)
             }
         }
+    }
+
+    fn after_sorting(&mut self, at_boundary: bool, actions: &mut Vec<Action>) -> Result<(), String> {
+        self.phase = if at_boundary { Phase::AwaitGhosts } else { Phase::AwaitTotals };
+        self.resume_waiting(actions)
     }
 
     fn resume_waiting(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
@@ -387,9 +407,7 @@ impl Session {
             }
             (Phase::Packing, Outcome::Transferred(state)) => {
                 all_finite("position or velocity", &state)?;
-                if !state.is_empty() {
-                    actions.push(Action::Send(ToMaster::Transfer { cycle: self.cycle, state }));
-                }
+                self.hand_over(state, actions)?;
                 self.phase = Phase::Elements;
                 let (quantum, time) = self.quantum_and_time()?;
                 let dt_previous = self.dt_previous;
@@ -421,6 +439,14 @@ impl Session {
                 self.sample_due = false;
                 self.phase = Phase::AwaitTotals;
                 self.try_integrate(actions)
+            }
+            (Phase::Sorting { at_boundary }, Outcome::Spread(patches)) => {
+                self.spread(patches, actions);
+                self.after_sorting(at_boundary, actions)
+            }
+            (Phase::Sorting { at_boundary }, Outcome::Sorted { gathered_at, sorted }) => {
+                actions.push(Action::Send(ToMaster::Sorted { gathered_at, sorted }));
+                self.after_sorting(at_boundary, actions)
             }
             (Phase::Proving, Outcome::Forces { .. }) => {
                 actions.push(Action::Compute(Task::Interior { dt_previous: self.dt_previous }));
@@ -478,9 +504,10 @@ impl Session {
             if blocking {
                 acts_at = self.cycle + 1;
                 self.boundaries.retain(|(_, at)| *at <= self.cycle);
-                self.plans.retain(|(at, ..)| *at <= self.cycle);
+                self.plans.retain(|plan| plan.acts_at <= self.cycle);
             }
             self.boundaries.push_back((self.cycle, acts_at));
+            self.sorts.iter_mut().for_each(Sorts::gather);
         }
         if self.boundaries.front().is_some_and(|(_, at)| *at == self.cycle) {
             self.phase = Phase::AwaitGhosts;
@@ -494,50 +521,14 @@ impl Session {
         Ok(())
     }
 
-    /// At a plan boundary: with the plan in hand the transfer and the elements go first, then, with the ghosts in hand,
-    /// the plan is installed.
-    fn try_boundary(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
-        let Some((acts_at, _, plan)) = self.plans.front() else { return Ok(()) };
-        if *acts_at != self.cycle {
-            return Err(format!("the next plan acts at cycle {acts_at}, this is cycle {}", self.cycle));
-        }
-        if !self.whole {
-            self.phase = Phase::Packing;
-            actions.push(Action::Compute(Task::Transfer { nodes: plan.send.clone() }));
-            return Ok(());
-        }
-        let ghost_state = match (&self.ghosts, plan.ghosts.is_empty()) {
-            (_, true) => Vec::new(),
-            (Some((cycle, _)), false) if *cycle == self.cycle => match self.ghosts.take() {
-                Some((_, state)) => state,
-                None => return Ok(()),
-            },
-            _ => return Ok(()),
-        };
-        let Orders { gather, blocking, .. } = *self.flags()?;
-        if let Some((_, hash, plan)) = self.plans.pop_front() {
-            self.boundaries.pop_front();
-            self.n_exchange = plan.exchange.len();
-            self.neighbours.clone_from(&plan.neighbours);
-            self.stride = plan.stride();
-            self.plan_hash = hash;
-            self.phase = Phase::Border;
-            actions.push(Action::Compute(Task::Install {
-                plan,
-                ghost_state,
-                dt_previous: self.dt_previous,
-                gather,
-                blocking,
-            }));
-        }
-        Ok(())
-    }
-
     /// A worker that shares no node needs only the orders of the cycle before.
     fn try_integrate(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
         if self.sample_due {
             self.phase = Phase::Sampling;
             actions.push(Action::Compute(Task::Sample { cycle: self.cycle }));
+            return Ok(());
+        }
+        if self.sort(false, actions) {
             return Ok(());
         }
         let Some(orders) = self.orders.get(&self.cycle) else { return Ok(()) };
@@ -556,5 +547,7 @@ impl Session {
     }
 }
 
+#[cfg(test)]
+mod sorting_tests;
 #[cfg(test)]
 mod tests;

@@ -32,7 +32,8 @@ impl Job {
         if let Some(what) = not_a_number(votes.vote.as_deref(), &[], n_parts) {
             return self.blame(worker, cycle, &what, actions);
         }
-        let gathers = self.epoch.sorts.gathers_at(cycle);
+        let sorts = &self.epoch.sorts;
+        let gathers = sorts.gathers_at(cycle) && !sorts.are_by_workers();
         self.epoch.inflow.add_votes(worker, cycle, votes, gathers)?;
         self.complete_whole(actions)
     }
@@ -50,7 +51,11 @@ impl Job {
         match cycle.checked_sub(next) {
             // Of a gathering that was replaced before they came.
             None => Ok(()),
-            Some(ahead) if self.epoch.root.is_some() && ahead < POSITIONS_AHEAD => {
+            Some(ahead)
+                if self.epoch.root.is_some()
+                    && !self.epoch.sorts.are_by_workers()
+                    && ahead < POSITIONS_AHEAD =>
+            {
                 self.epoch.inflow.add_gathered(worker, cycle, positions)?;
                 self.complete_whole(actions)
             }

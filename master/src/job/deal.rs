@@ -12,10 +12,7 @@ use mechanics::{
     state::GlobalState,
     vote::Watched,
 };
-use protocol::{
-    message::{Assign, ToWorker},
-    options::{Balance, Route},
-};
+use protocol::message::{Assign, ToWorker};
 use rayon::prelude::*;
 
 use super::{
@@ -40,8 +37,9 @@ use crate::{
     exchange::Exchange,
     node_owners::NodeOwners,
     options::SessionOptions,
+    patches,
     snapshot::Snapshot,
-    sort::{Gathered, SortBasis, Sorter},
+    sort::{Gathered, SortBasis, Sorter, What},
 };
 
 impl Job {
@@ -111,11 +109,6 @@ impl Job {
         self.epoch.sorts.forget_state(&statics);
     }
 
-    /// Whether the master looks at the vote of each worker, so that nobody may merge them before.
-    fn votes_are_looked_at(&self) -> bool {
-        self.options.asked.verify > 0.0 || self.options.asked.balance == Balance::Measured
-    }
-
     /// Deals the newest checkpoint out to a set of workers, as epoch `number`.
     pub(super) fn deal(
         &mut self,
@@ -171,7 +164,8 @@ impl Job {
                     costs,
                     &division.gather,
                 );
-                let x = Gathered { cycle: state.cycle, x: sorter.positions_of(state) };
+                let what = What::Positions(sorter.positions_of(state));
+                let x = Gathered { cycle: state.cycle, what };
                 let whole = SortBasis {
                     epoch: number,
                     sorter,
@@ -199,13 +193,35 @@ impl Job {
             sections: model.output.sections.iter().map(|section| section.cut.clone()).collect(),
             row_cycles: model.output.history_cycles,
         };
-        let is_one_for_all = self.options.route() == Route::Direct && !self.votes_are_looked_at();
         let mut trees = Vec::new();
-        if is_one_for_all && n >= self.options.tree.from {
+        if self.options.has_tree(n) {
             let cycle = elements.iter().sum::<f64>() / speeds.iter().sum::<f64>();
             trees = tree::tree(&exchange.plans, &speeds, self.options.tree.neighbours, (cycle, costs));
             epoch.root = trees.iter().position(|place| place.parent.is_none());
         }
+        let mut sortings = match (&basis, &model.setup.contact) {
+            (Some(basis), Some(settings))
+                if patches::are_sorted_by_workers(
+                    model,
+                    &self.options,
+                    &speeds,
+                    basis.sorter.surface().nodes.len() as f64,
+                ) =>
+            {
+                let owners = decompose::owners(&model.mesh, &layout);
+                let mass = |node: u32| state.mass[node as usize];
+                let (surface, exclusions) = (basis.sorter.surface(), basis.sorter.exclusions());
+                let x = basis.sorter.positions_of(state);
+                let who = (&owners[..], &division.gather[..]);
+                let mut sortings = patches::cut(surface, (settings, exclusions), who, &x, &mass);
+                for (sorting, standing) in sortings.iter_mut().zip(&basis.node_owners.standing) {
+                    sorting.standing.clone_from(standing);
+                }
+                sortings
+            }
+            _ => Vec::new(),
+        };
+        let by_workers = !sortings.is_empty();
         for (position, subdomains) in division.by_worker.into_iter().enumerate() {
             let assign = Assign {
                 epoch: number,
@@ -224,6 +240,7 @@ impl Job {
                 ghost_state: exchange.ghost_state_from(position, state),
                 bodies: bodies.clone(),
                 tree: trees.get(position).cloned(),
+                sorting: sortings.get_mut(position).map(|sorting| Box::new(std::mem::take(sorting))),
             };
             actions.push(Action::Send(at_work[position], ToWorker::Assign(Box::new(assign))));
         }
@@ -234,7 +251,7 @@ impl Job {
                 .map(|(spec, &e)| Deal { name: spec.name.clone(), speed: spec.speed, elements: e as u64 })
                 .collect(),
         ));
-        epoch.sorts.begin(state.cycle, basis, exchange);
+        epoch.sorts.begin(state.cycle, (basis, by_workers), exchange);
         epoch.inflow = Inflow::new(n, checkpoint.continuation.vote.clone());
         epoch.meter = Meter::new(n);
         epoch.at_work = at_work;

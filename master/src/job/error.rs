@@ -155,6 +155,8 @@ pub enum Breach {
         /// Numbers that were expected.
         expected: usize,
     },
+    /// A sort of a cycle with nodes, parts or boxes that cannot be.
+    NoSort(u64),
     /// State of nodes that move to other workers, in a cycle in which none do.
     TransferWithoutPlan(u64),
     /// So many numbers of such state.
@@ -174,6 +176,7 @@ pub enum Sent {
     Positions,
     WorkerState,
     Sample,
+    Sort,
 }
 
 /// Nodes or edges of two parts that start nearer than the gap.
@@ -300,6 +303,7 @@ impl Breach {
                     Sent::Positions => "positions of ",
                     Sent::WorkerState => "its image of ",
                     Sent::Sample => "its sample of ",
+                    Sent::Sort => "its sort of ",
                 };
                 write!(f, "worker {worker} sends {what}cycle {cycle} twice")
             }
@@ -309,6 +313,7 @@ impl Breach {
                     Sent::Positions => "positions",
                     Sent::WorkerState => "an image",
                     Sent::Sample => "a sample",
+                    Sent::Sort => "a sort",
                 };
                 write!(f, "worker {worker} sends {what} of cycle {cycle}, which nobody asked for")
             }
@@ -319,6 +324,10 @@ impl Breach {
             Self::Gathered { numbers, expected } => {
                 write!(f, "worker {worker} gathered {numbers} numbers, expected {expected}")
             }
+            Self::NoSort(cycle) => write!(
+                f,
+                "worker {worker} sends a sort of cycle {cycle} with nodes, parts or boxes that there are not"
+            ),
             Self::TransferWithoutPlan(cycle) => {
                 write!(f, "worker {worker} transfers nodes at cycle {cycle}, where no plan acts")
             }

@@ -4,7 +4,10 @@
 //! a lag after the gathering, so nobody waits for it; only where elements have eroded all wait for a *blocking* one, which
 //! acts in the next cycle with the new surface.
 
-use std::{collections::VecDeque, sync::Arc};
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::Arc,
+};
 
 use deck::model::Model;
 use mechanics::{
@@ -13,10 +16,13 @@ use mechanics::{
     vote::Vote,
 };
 
-use super::error::Error;
+use protocol::message::SortedPatch;
+
+use super::error::{Breach, Error, Sent};
 use crate::{
     erosion::Eroded,
     exchange::Exchange,
+    patches,
     sort::{SortBasis, Sorted},
 };
 
@@ -59,6 +65,8 @@ pub(super) struct Sorts {
     basis: Option<Arc<SortBasis>>,
     /// None where nothing can erode.
     eroded: Option<Eroded>,
+    /// Where workers sort themselves: what has come of each gathering, by worker.
+    patches: Option<BTreeMap<u64, Vec<Option<SortedPatch>>>>,
     /// Oldest first.
     under_way: VecDeque<UnderWay>,
     /// By the cycle they act from; the first is in force at the oldest cycle that is not complete.
@@ -78,6 +86,7 @@ impl Sorts {
         Self {
             basis: None,
             eroded: Eroded::new(state),
+            patches: None,
             under_way: VecDeque::new(),
             acting: VecDeque::new(),
             last_gather: state.cycle,
@@ -87,15 +96,55 @@ impl Sorts {
         }
     }
 
-    /// Begins with the first exchange, from the positions at the start of `cycle`.
-    pub(super) fn begin(&mut self, cycle: u64, basis: Option<Arc<SortBasis>>, exchange: Arc<Exchange>) {
+    /// Begins with the first exchange, from the positions at the start of `cycle`. Later sorts are the master's or the workers'.
+    pub(super) fn begin(
+        &mut self,
+        cycle: u64,
+        (basis, by_workers): (Option<Arc<SortBasis>>, bool),
+        exchange: Arc<Exchange>,
+    ) {
         self.basis = basis;
+        self.patches = by_workers.then(BTreeMap::new);
         self.acting = VecDeque::from([Acting { at: cycle, gathered: cycle, exchange, census: None }]);
     }
 
     /// What sorts work on; none without contact.
     pub(super) fn basis(&self) -> Option<&Arc<SortBasis>> {
         self.basis.as_ref()
+    }
+
+    /// Whether workers sort what they hold of the surface.
+    pub(super) fn are_by_workers(&self) -> bool {
+        self.patches.is_some()
+    }
+
+    /// Adds what came of one of `n` workers' sort; gives what came of all, once it is here.
+    ///
+    /// # Errors
+    /// If nobody asked for it, it cannot be such, or it came before.
+    pub(super) fn add_patch(
+        &mut self,
+        (worker, n): (usize, usize),
+        gathered: u64,
+        sorted: SortedPatch,
+    ) -> Result<Option<Vec<SortedPatch>>, Error> {
+        let asked = self.gathers_at(gathered);
+        let (Some(all), Some(basis), true) = (&mut self.patches, &self.basis, asked) else {
+            return Err(Error::Worker(worker, Breach::Unasked(Sent::Sort, gathered)));
+        };
+        let SortedPatch { ghosts, boxes, .. } = &sorted;
+        let n_parts = basis.sorter.n_parts();
+        if !patches::are_sound((worker as u32, ghosts), boxes, &basis.node_owners, n_parts) {
+            return Err(Error::Worker(worker, Breach::NoSort(gathered)));
+        }
+        let of_cycle = all.entry(gathered).or_insert_with(|| vec![None; n]);
+        if of_cycle[worker].replace(sorted).is_some() {
+            return Err(Error::Worker(worker, Breach::Twice(Sent::Sort, gathered)));
+        }
+        if of_cycle.iter().any(Option::is_none) {
+            return Ok(None);
+        }
+        Ok(all.remove(&gathered).map(|of_cycle| of_cycle.into_iter().flatten().collect()))
     }
 
     /// What has eroded; none where nothing can.
@@ -284,21 +333,22 @@ mod tests {
         super::{Job, tests::job},
         *,
     };
-    use crate::sort::Gathered;
+    use crate::sort::{Gathered, What};
 
     /// Sorts of two cubes that may meet, and the job they are of.
     fn sorts() -> (Sorts, Job) {
         let (job, _) = job(2);
         let mut sorts = Sorts::new(job.start_state(), 0.0);
         let exchange = job.epoch.sorts.exchange_at(0).expect("the first plan");
-        sorts.begin(0, job.epoch.sorts.basis().cloned(), exchange);
+        sorts.begin(0, (job.epoch.sorts.basis().cloned(), false), exchange);
         (sorts, job)
     }
 
     /// What comes of the sort of a cycle.
     fn sorted(sorts: &Sorts, job: &Job, cycle: u64) -> Sorted {
         let basis = sorts.basis().expect("the cubes may meet");
-        basis.sort(&Gathered { cycle, x: basis.sorter.positions_of(job.start_state()) })
+        let what = What::Positions(basis.sorter.positions_of(job.start_state()));
+        basis.sort(&Gathered { cycle, what })
     }
 
     #[test]

@@ -2,17 +2,17 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use mechanics::vote::Vote;
+use mechanics::{contact::PartBox, vote::Vote};
 use protocol::{
-    message::{ToMaster, ToWorker, WORKER_STATE_VERSION, Work},
-    options::{Balance, JobOptions},
+    message::{SortedPatch, ToMaster, ToWorker, WORKER_STATE_VERSION, Work},
+    options::{Balance, JobOptions, Route, SortBy},
 };
 
 use super::{Job, workers::Goes};
 use crate::{
     event::{Action, Event, WorkerSpec},
-    options::SessionOptions,
-    sort::Gathered,
+    options::{SessionOptions, VoteTree},
+    sort::{Gathered, What},
 };
 
 pub(super) const DECK: &str = r#"
@@ -202,7 +202,8 @@ fn a_job_without_workers_that_is_stopped_ends_with_the_state_it_went_back_to() {
 fn a_job_that_keeps_no_state_sorts_all_the_same_and_says_so_when_a_worker_is_lost() {
     let (mut job, _) = job(2);
     let bench = job.epoch.sorts.basis().cloned().expect("the cubes may meet");
-    let x = Gathered { cycle: 0, x: bench.sorter.positions_of(job.start_state()) };
+    let what = What::Positions(bench.sorter.positions_of(job.start_state()));
+    let x = Gathered { cycle: 0, what };
     let interactions = bench.sort(&x).interactions;
     drop(bench);
     job.keep_no_state();
@@ -214,10 +215,65 @@ fn a_job_that_keeps_no_state_sorts_all_the_same_and_says_so_when_a_worker_is_los
 }
 
 #[test]
+fn a_sort_of_a_worker_that_nobody_asked_for_or_that_cannot_be_ends_the_job_with_its_name() {
+    let model = Arc::new(deck::read(DECK, "two cubes").expect("a good deck"));
+    let asked = JobOptions {
+        route: Some(Route::Direct),
+        sort_by: SortBy::Workers,
+        sort_every: Some(1),
+        ..JobOptions::default()
+    };
+    let options = || SessionOptions {
+        asked: asked.clone(),
+        tree: VoteTree { from: 2, neighbours: 12 },
+        ..Default::default()
+    };
+    let told = |sorted: SortedPatch, gathered_at: u64, times: usize| {
+        let (mut job, actions) =
+            Job::new(Arc::clone(&model), &specs(2), options(), None).expect("a good problem");
+        let sorts = |action: &Action| {
+            matches!(action, Action::Send(_, ToWorker::Assign(assign))
+                if assign.sorting.as_ref().is_some_and(|sorting| !sorting.patch.faces.is_empty()))
+        };
+        assert_eq!(actions.iter().filter(|action| sorts(action)).count(), 2);
+        for worker in 0..2 {
+            let vote = Some(Box::new(Vote { courant: 1e-4, ..Vote::empty(2) }));
+            let ready = ToMaster::Ready { vote, lanes: "scalar".into() };
+            job.apply(Event::Message(worker, 0, ready));
+        }
+        let mut last = Vec::new();
+        for _ in 0..times {
+            let sorted = Box::new(sorted.clone());
+            last = job.apply(Event::Message(1, 0, ToMaster::Sorted { gathered_at, sorted }));
+        }
+        last.into_iter().find_map(|action| match action {
+            Action::Over(outcome) => outcome.failure,
+            _ => None,
+        })
+    };
+    let none = SortedPatch::default;
+    assert_eq!(told(none(), 1, 1), None);
+    let says = |told: Option<String>, what: &str| told.is_some_and(|told| told.contains(what));
+    assert!(says(told(none(), 1, 2), "worker 1 sends its sort of cycle 1 twice"));
+    assert!(says(told(none(), 3, 1), "worker 1 sends a sort of cycle 3, which nobody asked for"));
+    let everywhere = PartBox { part: 2, low: [0.0; 3], high: [1.0; 3] };
+    for bad in [
+        SortedPatch { ghosts: vec![u32::MAX], ..none() },
+        SortedPatch { ghosts: vec![3, 3], ..none() },
+        SortedPatch { ghosts: (0..54).collect(), ..none() },
+        SortedPatch { boxes: vec![everywhere], ..none() },
+        SortedPatch { boxes: vec![PartBox { part: 0, low: [f64::NAN; 3], ..everywhere }], ..none() },
+    ] {
+        assert!(says(told(bad, 1, 1), "nodes, parts or boxes that there are not"));
+    }
+}
+
+#[test]
 fn a_sort_of_an_epoch_that_is_over_is_of_no_use() {
     let (mut job, _) = job(2);
     let bench = job.epoch.sorts.basis().cloned().expect("the cubes may meet");
-    let x = Gathered { cycle: 0, x: bench.sorter.positions_of(job.start_state()) };
+    let what = What::Positions(bench.sorter.positions_of(job.start_state()));
+    let x = Gathered { cycle: 0, what };
     let sorted = Box::new(bench.sort(&x));
     job.apply(Event::Lost(0, "cable".into()));
     assert!(job.apply(Event::Sorted(sorted)).is_empty() && !job.is_over());

@@ -11,7 +11,7 @@ use super::{
     machines::{Costs, Machines, Scheme},
     virtual_clock,
 };
-use crate::balance;
+use crate::{balance, patches};
 
 /// Work of one cycle of a problem on one host: elements, nodes, pairs, pairs of new plans, surface nodes sorted.
 pub type Work = [f64; 5];
@@ -65,9 +65,19 @@ pub fn seconds(costs: &Costs, work: &Work) -> f64 {
 }
 
 /// The speeds by which the master deals out work: its own host has less left beside sorts of `sorted` surface nodes
-/// ([`balance::beside_sorts`], the same that the daemon does).
-pub fn believed(speeds: &[f64], costs: &Costs, work: &Work, sorted: f64, lag: u32) -> Vec<f64> {
+/// ([`balance::beside_sorts`], the same that the daemon does), unless the workers sort.
+pub fn believed(
+    model: &Model,
+    (speeds, scheme): (&[f64], &Scheme),
+    (costs, dealt_by): (&Costs, balance::Costs),
+    work: &Work,
+) -> Vec<f64> {
+    let sorted = surface_nodes(model);
+    if patches::are_sorted_by_workers(model, &scheme.options(dealt_by), speeds, sorted) {
+        return speeds.to_vec();
+    }
     let beside: Vec<bool> = (0..speeds.len()).map(|host| host == 0).collect();
+    let lag = model.setup.control.sort_lag;
     balance::beside_sorts(speeds, &beside, seconds(costs, work), costs.sort * sorted, lag)
 }
 

@@ -1,13 +1,16 @@
 //! What a run is put on: hosts, what work costs on them, and how the program itself goes about it.
 
 use mechanics::{cycle::Load, lanes::Width};
-use protocol::options::{Balance, Route};
+use protocol::options::{Balance, JobOptions, Route, SortBy};
 
 use super::{
     network::Network,
     timeline::{Kind, Phases},
 };
-use crate::balance::{self, Dealing};
+use crate::{
+    balance::{self, Dealing},
+    options::SessionOptions,
+};
 
 /// What work costs on a host of speed 1 (s).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -122,9 +125,29 @@ pub struct Scheme {
     pub lanes: Option<Width>,
     /// Sorts beside those that are due: a measurement needs some, and new plans, in a short run.
     pub sort_every: Option<u64>,
+    /// Who sorts.
+    pub sort_by: SortBy,
 }
 
 impl Scheme {
+    /// What the master's session goes by on these machines.
+    pub fn options(&self, dealt_by: balance::Costs) -> SessionOptions {
+        SessionOptions {
+            asked: JobOptions {
+                route: Some(self.route),
+                balance: self.balance,
+                lanes: self.lanes.map(|width| width.to_string()),
+                sort_every: self.sort_every,
+                sort_by: self.sort_by,
+                no_output: true,
+                ..JobOptions::default()
+            },
+            dealing: self.dealing,
+            costs: dealt_by,
+            ..SessionOptions::default()
+        }
+    }
+
     /// What Bolide does, on a route.
     pub fn bolide(route: Route) -> Self {
         Self {
@@ -134,6 +157,7 @@ impl Scheme {
             balance: Balance::Given,
             lanes: None,
             sort_every: None,
+            sort_by: SortBy::Auto,
         }
     }
 
@@ -146,6 +170,7 @@ impl Scheme {
             balance: Balance::Given,
             lanes: None,
             sort_every: None,
+            sort_by: SortBy::Auto,
         }
     }
 }

@@ -123,17 +123,17 @@ pub fn run(
     for (b, model) in models.iter().enumerate() {
         told(&format!("benchmark {}, one host", b + 1));
         let work = calibrate::work(model, cluster)?;
-        let sorted = calibrate::surface_nodes(model);
-        let lag = model.setup.control.sort_lag;
         let (mut one_host, mut digest) = (0.0, String::new());
         for &n in &tables.hosts {
             let part = cluster.first(n);
-            let believed = calibrate::believed(&part.speeds, &costs, &work, sorted, lag);
             for (name, route) in ROUTES {
                 if n == 1 && route == Route::Master {
                     continue;
                 }
                 told(&format!("benchmark {}, {n} hosts, {name}", b + 1));
+                let (scheme, dealt_by) = (Scheme::bolide(route), costs.relative(&part.network));
+                let by = (&costs, dealt_by);
+                let believed = calibrate::believed(model, (&part.speeds, &scheme), by, &work);
                 let mut tape = None;
                 for &rate in &tables.rates {
                     let machines = Machines {
@@ -142,10 +142,9 @@ pub fn run(
                         costs,
                         network: Network { rate, ..part.network.clone() },
                         changes: part.changes.clone(),
-                        dealt_by: costs.relative(&part.network),
+                        dealt_by,
                     };
-                    let (timeline, kept) =
-                        virtual_clock::run(model, &machines, Scheme::bolide(route), tape.as_ref())?;
+                    let (timeline, kept) = virtual_clock::run(model, &machines, scheme, tape.as_ref())?;
                     tape = tape.or(kept);
                     let seconds = timeline.seconds_per_cycle();
                     if digest.is_empty() {

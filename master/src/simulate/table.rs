@@ -154,8 +154,8 @@ fn cells(
         "control" => part.speeds.clone(),
         _ => {
             let costs = calibrate::costs(cluster, works, 1.0);
-            let sorted = calibrate::surface_nodes(model);
-            calibrate::believed(&part.speeds, &costs, &works[benchmark], sorted, model.setup.control.sort_lag)
+            let by = (&costs, costs.relative(&part.network));
+            calibrate::believed(model, (&part.speeds, &scheme), by, &works[benchmark])
         }
     };
     let mut tape = None;

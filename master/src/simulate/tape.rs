@@ -5,10 +5,11 @@
 use std::collections::VecDeque;
 
 use mechanics::{
+    contact::{BatchFace, BatchNode, Patch, PlacedPatch},
     cycle::{Load, Meter},
     vote::Vote,
 };
-use protocol::message::Work;
+use protocol::message::{SortedPatch, Work};
 use worker::{
     compute::{Machine, ThreadClock},
     session::{Outcome, Task},
@@ -66,6 +67,44 @@ enum Kept {
     Integrated(Box<Vote>),
     WorkerState,
     Sampled([u8; 16]),
+    /// By receiver.
+    Spread(Vec<(u32, KeptPatch)>),
+    Sorted(u64, Box<SortedPatch>),
+}
+
+/// The size of a patch: a node and a face of it, and how many there are.
+#[derive(Clone)]
+struct KeptPatch {
+    node: Option<BatchNode>,
+    face: Option<BatchFace>,
+    numbers: [usize; 2],
+}
+
+impl KeptPatch {
+    fn of(PlacedPatch { patch, .. }: &PlacedPatch) -> Self {
+        let numbers = [patch.nodes.len(), patch.faces.len()];
+        Self { node: patch.nodes.last().copied(), face: patch.faces.last().copied(), numbers }
+    }
+
+    /// As long as it was, and as sound. Nobody sorts it.
+    fn give(self) -> PlacedPatch {
+        let [nodes, faces] = self.numbers;
+        // The last number is the highest.
+        let ends_at = |last: u32, n: usize| (last + 1).saturating_sub(n as u32)..=last;
+        let nodes_of = |node: BatchNode| {
+            ends_at(node.global, nodes).map(|global| BatchNode { global, ..node }).collect()
+        };
+        let faces_of = |face: BatchFace| {
+            let mut faces = vec![face; faces];
+            ends_at(face.id, faces.len()).zip(&mut faces).for_each(|(id, face)| face.id = id);
+            faces
+        };
+        let patch = Patch {
+            nodes: self.node.map(nodes_of).unwrap_or_default(),
+            faces: self.face.map(faces_of).unwrap_or_default(),
+        };
+        PlacedPatch { patch, x: vec![[0.0; 3]; nodes] }
+    }
 }
 
 impl Kept {
@@ -80,8 +119,15 @@ impl Kept {
                 | (Self::Integrated(_), Task::Integrate { .. })
                 | (Self::WorkerState, Task::WorkerState { .. })
                 | (Self::Sampled(_), Task::Sample { .. })
+                | (Self::Spread(_), Task::Spread { .. })
+                | (Self::Sorted(..), Task::Sort { .. })
         )
     }
+}
+
+/// Whether a task is one of a sort: those come between the others whenever messages have arrived, in an order of their own.
+fn is_of_sort(task: &Task) -> [bool; 2] {
+    [matches!(task, Task::Spread { .. }), matches!(task, Task::Sort { .. })]
 }
 
 /// A worker's part in a run: computes, or plays a tape.
@@ -127,8 +173,16 @@ impl Player {
                 Ok((outcome, *load))
             }
             Self::Tape(left) => {
-                let Taped { load, kept, .. } =
-                    left.pop_front().ok_or("the tape of a run is shorter than the run")?;
+                let of_sort = is_of_sort(&task);
+                let kind = |kept: &Kept| [matches!(kept, Kept::Spread(_)), matches!(kept, Kept::Sorted(..))];
+                let next = left.iter().position(|taped| kind(&taped.kept) == of_sort);
+                let next = next.and_then(|next| left.remove(next));
+                // The run that was taped may have ended before this sort, whose plan would act after the end.
+                if let (None, Task::Sort { gathered_at, .. }) = (&next, &task) {
+                    let sorted = Box::new(SortedPatch::default());
+                    return Ok((Outcome::Sorted { gathered_at: *gathered_at, sorted }, Load::default()));
+                }
+                let Taped { load, kept, .. } = next.ok_or("the tape of a run is shorter than the run")?;
                 if !kept.answers(&task) {
                     return Err("the tape is of a run with other sorts: report this as a bug".to_owned());
                 }
@@ -147,6 +201,10 @@ fn keep(outcome: &Outcome) -> Result<Kept, String> {
         Outcome::Integrated(vote) => Kept::Integrated(vote.clone()),
         Outcome::WorkerState { .. } => Kept::WorkerState,
         Outcome::Sampled(hash) => Kept::Sampled(*hash),
+        Outcome::Spread(patches) => {
+            Kept::Spread(patches.iter().map(|(to, patch)| (*to, KeptPatch::of(patch))).collect())
+        }
+        Outcome::Sorted { gathered_at, sorted } => Kept::Sorted(*gathered_at, sorted.clone()),
         Outcome::Failed(reason) => return Err(reason.clone()),
     })
 }
@@ -161,6 +219,10 @@ fn give(kept: Kept) -> Outcome {
         }
         Kept::Integrated(vote) => Outcome::Integrated(vote),
         Kept::Sampled(hash) => Outcome::Sampled(hash),
+        Kept::Spread(patches) => {
+            Outcome::Spread(patches.into_iter().map(|(to, patch)| (to, patch.give())).collect())
+        }
+        Kept::Sorted(gathered_at, sorted) => Outcome::Sorted { gathered_at, sorted },
         Kept::WorkerState => Outcome::WorkerState { pieces: Vec::new(), work: Work::default() },
     }
 }

@@ -45,7 +45,7 @@ pub enum Kind {
     Integrate,
     /// A state, or a sample of what elements came to.
     WorkerState,
-    /// The master sorts.
+    /// The master or a worker sorts, or the master makes plans of what workers have sorted.
     Sort,
     /// A message leaves.
     Send,
@@ -64,6 +64,7 @@ impl Kind {
             Task::Interior { .. } => Kind::Interior,
             Task::Integrate { .. } => Kind::Integrate,
             Task::WorkerState { .. } | Task::Sample { .. } => Kind::WorkerState,
+            Task::Spread { .. } | Task::Sort { .. } => Kind::Sort,
         }
     }
 }

@@ -16,10 +16,7 @@ use std::{
 };
 
 use deck::model::Model;
-use protocol::{
-    message::{self, ToWorker},
-    options::JobOptions,
-};
+use protocol::message::{self, ToWorker};
 use worker::session::{self, Session, Task};
 
 use super::{
@@ -30,11 +27,11 @@ use super::{
     timeline::{Flight, Kind, Span, Timeline, counts_at, phases_at},
 };
 use crate::{
-    embedded::timed_sort,
+    embedded::{WHOLE, timed_sort},
     event::{Action, Event, Outcome, WorkerSpec},
     job::Job,
     options::{CheckpointEvery, SessionOptions},
-    sort::{Gathered, SortBasis, Sorted},
+    sort::{self, Gathered, SortBasis, Sorted},
     world::{End, Error, Letter, Parcel, Sessions, Surroundings, World},
 };
 use agenda::{Begun, Due, Sent, What, Work};
@@ -92,22 +89,16 @@ pub fn run(
     let specs: Vec<WorkerSpec> = first_at_work.iter().map(|&host| spec(machines, host)).collect();
     let come_and_go = machines.come_and_go();
     let options = SessionOptions {
-        asked: JobOptions {
-            route: Some(scheme.route),
-            balance: scheme.balance,
-            lanes: scheme.lanes.map(|width| width.to_string()),
-            sort_every: scheme.sort_every,
-            no_output: true,
-            ..JobOptions::default()
-        },
         keep: if come_and_go { CheckpointEvery::Seconds(KEEP_SECONDS) } else { CheckpointEvery::Never },
         waits: come_and_go,
-        dealing: scheme.dealing,
-        costs: machines.dealt_by,
-        ..SessionOptions::default()
+        ..scheme.options(machines.dealt_by)
     };
-    let (job, first) =
+    let (mut job, first) =
         Job::new(Arc::clone(model), &specs, options, None).map_err(|e| Error::Surroundings(e.to_string()))?;
+    if !come_and_go {
+        // As in one process, nobody is lost.
+        job.keep_no_state();
+    }
     let players: Vec<Player> = match tape {
         None => (0..n).map(|_| Player::live()).collect(),
         Some(tape) => tape.workers.iter().map(|kept| Player::Tape(kept.iter().cloned().collect())).collect(),
@@ -165,6 +156,15 @@ pub fn run(
         .collect();
     let digest = timeline.digest.clone();
     Ok((timeline, Some(Tape { workers, sorts: sorts_kept, sort_ns, digest })))
+}
+
+/// Surface nodes that a task of a worker's sort handles: those that it sends, or those that it looks at.
+fn nodes_of_sort(outcome: &session::Outcome) -> usize {
+    match outcome {
+        session::Outcome::Spread(patches) => patches.iter().map(|(_, patch)| patch.x.len()).sum(),
+        session::Outcome::Sorted { sorted, .. } => sorted.nodes[1] as usize,
+        _ => 0,
+    }
 }
 
 /// A host as the job sees it.
@@ -446,7 +446,8 @@ impl Surroundings for Clock<'_> {
         let kind = Kind::of(&task);
         let cycle = sessions.hosts[host].session.cycle();
         let (outcome, load) = self.places[host].player.run(task)?;
-        let costs = self.machines.costs.of(kind, &load);
+        let mut costs = self.machines.costs.of(kind, &load);
+        costs.contact += self.machines.costs.sort * nodes_of_sort(&outcome) as f64;
         let speed = self.machines.speeds[host];
         self.timeline.enter((host, cycle), (kind, &load), &costs, speed);
         // Host 0 keeps some of its time for the master's sorts; it is slower by that.
@@ -467,12 +468,19 @@ impl Surroundings for Clock<'_> {
             self.sort_ns.push(ns as f64 / x.n_nodes().max(1) as f64);
             *sorted
         } else {
-            self.sorts.pop_front().ok_or("the tape of a run has fewer sorts than the run")?
+            let at = self.sorts.iter().position(|sorted| sorted.gathered == x.cycle);
+            match at.and_then(|at| self.sorts.remove(at)) {
+                Some(sorted) => sorted,
+                // The run that was taped ended before it began: its plan would act after the end.
+                None => return Ok(()),
+            }
         };
         let cycle = self.timeline.counts.len() as u64 - 1;
         counts_at(&mut self.timeline.counts, cycle).sorted += x.n_nodes() as u64;
         let seconds = self.machines.costs.sort * x.n_nodes() as f64;
-        self.charge(0, Rank::Idle, seconds, Work::Sort(Box::new(sorted)));
+        // Workers wait for plans of what they have sorted; a sort of all is long, and takes what is idle.
+        let rank = if matches!(x.what, sort::What::Patches(_)) { Rank::Message } else { Rank::Idle };
+        self.charge(0, rank, seconds, Work::Sort(Box::new(sorted)));
         Ok(())
     }
 
@@ -490,6 +498,10 @@ impl Surroundings for Clock<'_> {
 
     fn is_alive(&self, _: usize) -> bool {
         true
+    }
+
+    fn hands_over(&self, elements: usize) -> bool {
+        elements > WHOLE
     }
 
     fn worked(&self, host: usize) -> Option<message::Work> {

@@ -20,11 +20,11 @@ use master::{
         network::{Network, Wires},
         paper::{self, Verdict},
         sweep, table,
-        timeline::Timeline,
+        timeline::{Kind, Span, Timeline},
         virtual_clock,
     },
 };
-use protocol::options::{Balance, Route};
+use protocol::options::{Balance, Route, SortBy};
 
 fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -321,6 +321,30 @@ fn the_master_handles_two_messages_a_cycle_whatever_the_number_of_workers() {
     };
     assert_eq!([5, 12, 24].map(of_master), [20; 3]);
     assert_eq!(of_master(4), 80, "few workers speak to it themselves");
+}
+
+#[test]
+fn workers_that_sort_send_the_master_their_ghosts_in_place_of_all_positions() {
+    let mut model = Arc::unwrap_or_clone(model("plates-free-slip.toml", 40));
+    model.setup.control.sort_lag = 4;
+    let model = Arc::new(model);
+    let by = |sort_by| {
+        let scheme = Scheme { sort_by, sort_every: Some(8), ..Scheme::bolide(Route::Direct) };
+        let timeline = run(&model, &machines(12), scheme);
+        let nodes: u64 = timeline.counts.iter().map(|counts| counts.sorted).sum();
+        let sorts = |master| {
+            let of = |span: &&Span| span.kind == Kind::Sort && span.master == master && span.cycle < 36;
+            timeline.spans.iter().filter(of).count()
+        };
+        (nodes, sorts(true), sorts(false), timeline.digest.clone())
+    };
+    let (positions, by_master, none, digest) = by(SortBy::Master);
+    let (ghosts, plans, by_workers, same) = by(SortBy::Workers);
+    assert_eq!((none, digest), (0, same));
+    assert!(by_master >= 3 && plans >= 3, "{by_master} {plans}");
+    // Each spreads its patch and sorts it.
+    assert!(by_workers >= 2 * 12 * 3, "{by_workers}");
+    assert!(2 * ghosts < positions && ghosts > 0, "{ghosts} ghosts, {positions} positions");
 }
 
 /// Eight hosts that compute and hardly talk, one of which changes its speed on the way.

@@ -25,6 +25,10 @@ pub fn cases() -> Vec<Case> {
             killed_in_sort(s, "die-in-elements:2")
         }),
         case("worker killed while it installs a plan", 1, |s, _| killed_in_sort(s, "die-in-install:2")),
+        case("one of six that sort, killed while it sends what is near others", 1, |s, _| {
+            killed_of_six(s, "die-in-spread:2")
+        }),
+        case("one of six that sort, killed while it sorts", 1, |s, _| killed_of_six(s, "die-in-sort:2")),
         case("worker killed while it sends its image for a snapshot", 1, |s, _| {
             killed_in(s, "die-in-image:2")
         }),
@@ -123,11 +127,20 @@ pub(super) fn close(
 
 /// A worker that ends itself at a point of its work.
 fn killed_in(scene: &Scene, fail: &str) -> Seen {
+    killed_of(scene, (&["a", "b"], &[]), fail)
+}
+
+/// Where workers sort what they hold of the surface.
+fn killed_of_six(scene: &Scene, fail: &str) -> Seen {
+    let asking = ["--route", "direct", "--sort-by", "workers"];
+    if scene.sorts { killed_of(scene, (&["a", "b", "d", "e", "f"], &asking), fail) } else { no_sorts() }
+}
+
+fn killed_of(scene: &Scene, (others, asking): (&[&str], &[&str]), fail: &str) -> Seen {
     let mut cluster = scene.cluster(&[], None, &[]);
-    cluster.worker("a", "1");
-    cluster.worker("b", "1");
+    others.iter().for_each(|name| cluster.worker(name, "1"));
     cluster.worker_that_fails("c", fail);
-    let mut running = scene.submit(cluster);
+    let mut running = scene.submit_asking(cluster, asking);
     let died = running.cluster.process_mut("c").wait();
     let at = Instant::now();
     assert!(!died.success(), "it died of its own");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use deck::Model;
 use master::options::{CheckpointEvery, SessionOptions, VoteTree};
-use protocol::options::{JobOptions, Route};
+use protocol::options::{JobOptions, Route, SortBy};
 
 use super::{Draws, Flip, Played, Seen, play};
 use crate::solve::model;
@@ -291,6 +291,8 @@ impl Stage {
         options.tree =
             [VoteTree::default(), VoteTree { from: 2, neighbours: 12 }, VoteTree { from: 2, neighbours: 0 }]
                 [draws.below(3) as usize];
+        // There the workers may sort.
+        options.asked.sort_by = [SortBy::Auto, SortBy::Workers][draws.below(2) as usize];
         (Plot { snapshot_at, faults, ..Plot::quiet(workers) }, options)
     }
 

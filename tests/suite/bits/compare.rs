@@ -7,7 +7,7 @@ use master::{
     snapshot::file,
 };
 use mechanics::lanes::Width;
-use protocol::options::{JobOptions, Route};
+use protocol::options::{JobOptions, Route, SortBy};
 use tests::{
     bits::{Fingerprint, forced_sorts},
     solve::{Workers, solve, solve_through, without_states},
@@ -98,8 +98,13 @@ pub(crate) fn same_bits_from_files(model: &Model, cycles: &[u64]) {
 /// Compares `one`, a run on one worker, with runs on route direct.
 pub(crate) fn same_bits_on_route_direct(model: &Model, one: &Fingerprint) {
     let deep = VoteTree { from: 2, neighbours: 0 };
-    for (workers, tree) in [(2, VoteTree::default()), (3, deep), (5, VoteTree::default())] {
-        let options = without_states(JobOptions { route: Some(Route::Direct), ..JobOptions::default() });
+    for (workers, tree, sort_by, sort_seed) in [
+        (2, VoteTree::default(), SortBy::Master, None),
+        (3, deep, SortBy::Workers, None),
+        (5, VoteTree::default(), SortBy::Workers, Some(5)),
+    ] {
+        let route = Some(Route::Direct);
+        let options = without_states(JobOptions { route, sort_by, sort_seed, ..JobOptions::default() });
         let options = SessionOptions { tree, ..options };
         one.assert_equal(&fingerprint(model, asked(workers, options)), &format!("{workers} workers, direct"));
     }
@@ -116,7 +121,9 @@ pub(crate) fn losing_a_worker_changes_no_bit(model: &Model) {
     solve_through(model.clone(), Workers::of(3), &mut count).unwrap_or_else(|e| panic!("{e}"));
     let mut midway = 0;
     for (seed, route) in [Route::Master, Route::Direct].into_iter().cycle().take(8).enumerate() {
-        let options = without_states(JobOptions { route: Some(route), ..JobOptions::default() });
+        // With votes by a tree the workers may sort.
+        let sort_by = [SortBy::Master, SortBy::Workers][seed / 4];
+        let options = without_states(JobOptions { route: Some(route), sort_by, ..JobOptions::default() });
         // On route direct also of a hub and its children, and of a chain of hubs.
         let tree = VoteTree { from: [9, 2, 2, 2][seed / 2], neighbours: [12, 12, 0, 0][seed / 2] };
         let options = SessionOptions { keep: CheckpointEvery::Cycles(10), tree, ..options };

@@ -15,6 +15,7 @@ mod meter;
 mod plan;
 mod report;
 mod sharing;
+pub mod standing;
 #[cfg(test)]
 mod tests;
 mod touch;
@@ -41,8 +42,9 @@ use bodies::{Bodies, Held};
 use ghosts::Ghosts;
 use held_block::{HeldBlock, Order};
 pub use meter::{Meter, Unmeasured};
-pub use plan::{Ghost, Neighbour, Plan};
+pub use plan::{Ghost, Handed, Neighbour, Plan};
 use sharing::{Exchange, Groups, Holders, Numbers};
+pub use standing::{Added, Standing};
 use touch::HeldContact;
 
 /// The time of a cycle, its steps, and the quantum of its forces.

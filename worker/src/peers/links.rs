@@ -107,6 +107,11 @@ impl Links {
         }
     }
 
+    /// The plan of a gathering has come: patches of it have arrived.
+    pub fn settle(&mut self, gathered_at: u64) {
+        self.pairs.settle(gathered_at);
+    }
+
     /// Whether a link is still being made that this worker waits for.
     pub fn are_dialling(&self) -> bool {
         self.pairs.are_dialling()
@@ -208,10 +213,10 @@ impl Links {
                 return Err(Error::Message(format!("cycle {cycle} a second time, with other numbers")));
             }
         }
-        // Votes and orders follow no plan.
+        // The others follow no plan.
         let plan = match which.0 {
             SaidKind::Partials => session.plan_at(cycle),
-            SaidKind::Votes | SaidKind::Orders => Some(header.plan),
+            SaidKind::Votes | SaidKind::Orders | SaidKind::Patch | SaidKind::Transfer => Some(header.plan),
         };
         match plan {
             Some(plan) if plan == header.plan => Ok(Some(message)),

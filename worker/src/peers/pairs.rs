@@ -13,6 +13,12 @@ use protocol::message::{SaidKind, ToPeer};
 const KEPT: usize = 2;
 /// Frames of one kind from one worker that are remembered: those that may come twice, and those after them.
 const REMEMBERED: usize = 4;
+/// Patches may arrive as late as the plan that is made of them is due: [settled](Pairs::settle) ones are kept no longer.
+const PATCHES: usize = 64;
+
+const fn most(kind: SaidKind, of_cycles: usize) -> usize {
+    if matches!(kind, SaidKind::Patch) { PATCHES } else { of_cycles }
+}
 
 /// The way to one worker.
 #[derive(Debug)]
@@ -123,7 +129,7 @@ impl<L> Pairs<L> {
         let pair = self.0.entry(other).or_default();
         let Way::Link(link) = &pair.way else { return Err(message) };
         let kind = message.what.kind();
-        make_room(&mut pair.kept, KEPT, |kept| kept.what.kind() == kind);
+        make_room(&mut pair.kept, most(kind, KEPT), |kept| kept.what.kind() == kind);
         pair.kept.push_back(message);
         match pair.kept.back() {
             Some(message) => Ok((link, message)),
@@ -138,10 +144,17 @@ impl<L> Pairs<L> {
             Some((.., known)) if *known == checksum => Heard::Double,
             Some(_) => Heard::Differs,
             None => {
-                make_room(heard, REMEMBERED, |(known, ..)| *known == kind);
+                make_room(heard, most(kind, REMEMBERED), |(known, ..)| *known == kind);
                 heard.push_back((kind, cycle, checksum));
                 Heard::Fresh
             }
+        }
+    }
+
+    /// The plan of a gathering has come, so everybody has the patches of it and of those before.
+    pub fn settle(&mut self, gathered_at: u64) {
+        for pair in self.0.values_mut() {
+            pair.kept.retain(|kept| kept.what.kind() != SaidKind::Patch || kept.cycle > gathered_at);
         }
     }
 

@@ -1,7 +1,7 @@
 //! What happens to a session, and what it wants done.
 
-use mechanics::{cycle::Plan, exact::Quantum, piece::Piece, vote::Vote, wall::Pose};
-use protocol::message::{Assign, ToMaster, ToPeer, ToWorker, Work};
+use mechanics::{contact::PlacedPatch, cycle::Plan, exact::Quantum, piece::Piece, vote::Vote, wall::Pose};
+use protocol::message::{Around, Assign, SortedPatch, ToMaster, ToPeer, ToWorker, Work};
 
 /// What happens to a session.
 #[derive(Debug)]
@@ -53,6 +53,8 @@ pub enum Task {
     /// Install a plan; contact; partial forces.
     Install {
         plan: Box<Plan>,
+        /// Where workers sort themselves: the gathering whose own sort is the plan's batch, and who is around now.
+        sorted: Option<(u64, Vec<Around>)>,
         /// Six numbers by ghost.
         ghost_state: Vec<f64>,
         /// The step before.
@@ -98,6 +100,15 @@ pub enum Task {
     },
     /// What elements came to in this cycle, in one block.
     Sample { cycle: u64 },
+    /// What of this worker's patch is near others, at the start of this cycle.
+    Spread { cycle: u64 },
+    /// The sort of this worker's patch.
+    Sort {
+        /// The cycle whose positions it is of.
+        gathered_at: u64,
+        /// What the workers around have sent.
+        patches: Vec<PlacedPatch>,
+    },
 }
 
 /// What came of a task.
@@ -126,6 +137,13 @@ pub enum Outcome {
         work: Work,
     },
     Sampled([u8; 16]),
+    /// What goes to which worker.
+    Spread(Vec<(u32, PlacedPatch)>),
+    Sorted {
+        /// The cycle whose positions it was sorted from.
+        gathered_at: u64,
+        sorted: Box<SortedPatch>,
+    },
     /// The task failed: a sentence for the user.
     Failed(String),
 }

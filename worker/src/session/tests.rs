@@ -2,13 +2,13 @@
 
 use super::*;
 use mechanics::{
-    cycle::Ghost,
+    cycle::{Ghost, Plan},
     exact::Quanta,
     setup::{Control, Setup},
 };
 use protocol::message::{Aboard, BranchVote, Said, ToPeer, Tree, Work};
 
-fn assign(cycle: u64) -> Box<Assign> {
+pub(super) fn assign(cycle: u64) -> Box<Assign> {
     let quantum = Quantum::for_reference(1.0, 42);
     Box::new(Assign {
         epoch: 0,
@@ -50,10 +50,11 @@ fn assign(cycle: u64) -> Box<Assign> {
         ghost_state: Vec::new(),
         bodies: Vec::new(),
         tree: None,
+        sorting: None,
     })
 }
 
-fn orders(next: u64) -> Orders {
+pub(super) fn orders(next: u64) -> Orders {
     let force_quantum = Quantum::for_reference(1.0, 42);
     let (dt, time, walls) = (1e-3, 1e-3 * next as f64, Vec::new());
     Orders {
@@ -70,19 +71,19 @@ fn orders(next: u64) -> Orders {
     }
 }
 
-fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
+pub(super) fn hear(session: &mut Session, message: ToWorker) -> Vec<Action> {
     session.apply(Event::Message(message))
 }
 
-fn done(session: &mut Session, outcome: Outcome) -> Vec<Action> {
+pub(super) fn done(session: &mut Session, outcome: Outcome) -> Vec<Action> {
     session.apply(Event::Done(outcome))
 }
 
-fn forces() -> Outcome {
+pub(super) fn forces() -> Outcome {
     Outcome::Forces { partials: vec![0.0; 3], gathered: Vec::new() }
 }
 
-fn vote() -> Outcome {
+pub(super) fn vote() -> Outcome {
     Outcome::Integrated(Box::new(Vote::empty(1)))
 }
 
@@ -181,7 +182,8 @@ fn a_plan_is_installed_when_it_and_the_ghosts_are_there() {
     let plan =
         Box::new(Plan { ghosts: vec![Ghost { node: 9, mass: 1.0, constraint: 0 }], ..Plan::default() });
     assert_eq!((session.plan_at(2), session.plan_at(3)), (Some(7), None), "that of cycle 3 is still to come");
-    let actions = hear(&mut session, ToWorker::Plan { gathered_at: 1, acts_at: 3, plan, hash: 8 });
+    let actions =
+        hear(&mut session, ToWorker::Plan { gathered_at: 1, acts_at: 3, plan, hash: 8, around: Vec::new() });
     assert_eq!((session.plan_at(3), session.plan_at(4)), (Some(8), Some(8)));
     assert!(matches!(actions[..], [Action::Compute(Task::Transfer { .. })]));
     let actions = done(&mut session, Outcome::Transferred(vec![0.0; 6]));

@@ -28,7 +28,7 @@ impl Session {
         self.partials = partials;
         if self.branch.is_some() {
             self.send_by_tree(vote, frames, actions)?;
-            if self.flags()?.gather {
+            if self.sorts.is_none() && self.flags()?.gather {
                 actions.push(Action::Send(ToMaster::Gathered { cycle, positions: gathered }));
             }
             return Ok(());
@@ -77,6 +77,12 @@ impl Session {
             }
             (_, Said::Votes(votes)) => self.add_vote(cycle, Some(from), votes, actions)?,
             (_, Said::Orders(orders)) => self.take_orders(cycle, orders, actions),
+            (_, Said::Patch(patch)) => self.hear_patch(from, cycle, patch)?,
+            (_, Said::Transfer(state)) => {
+                if self.ghosts_heard.insert((cycle, from), state).is_some() {
+                    return Err(format!("worker {from} sends the ghosts of cycle {cycle} twice"));
+                }
+            }
         }
         self.resume_waiting(actions)
     }
@@ -136,12 +142,12 @@ pub(super) fn all_finite(what: &str, values: &[f64]) -> Result<(), String> {
 }
 
 /// The numbers, `stride` each, of these nodes.
-fn of_nodes(values: &[f64], nodes: &[u32], stride: usize) -> Result<Vec<f64>, String> {
+pub(super) fn of_nodes(values: &[f64], nodes: &[u32], stride: usize) -> Result<Vec<f64>, String> {
     let mut out = Vec::with_capacity(stride * nodes.len());
     for &node in nodes {
         let at = stride * node as usize;
         out.extend_from_slice(
-            values.get(at..at + stride).ok_or("a neighbour shares a node that is not in the exchange")?,
+            values.get(at..at + stride).ok_or("a plan names a node that is not in its list")?,
         );
     }
     Ok(out)

@@ -69,6 +69,18 @@ impl Exclusions {
         Self::new(surface, &all)
     }
 
+    /// Excludes pairs of a face's key and a global node.
+    pub(super) fn of_keys(pairs: impl Iterator<Item = (u64, u32)>) -> Self {
+        let mut pairs: Vec<_> = pairs.collect();
+        pairs.sort_unstable();
+        Self { pairs, edges: Vec::new() }
+    }
+
+    /// Whether the pair of a face, by its key, and a global node is excluded.
+    pub(super) fn has(&self, face: u64, node: u32) -> bool {
+        self.pairs.binary_search(&(face, node)).is_ok()
+    }
+
     /// The same, and pairs of edges given as [`super::initial_edges`] gives them.
     #[must_use]
     pub fn with_edges(mut self, surface: &Surface, pairs: &[([u32; 2], f64)]) -> Self {

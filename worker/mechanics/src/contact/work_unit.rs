@@ -1,4 +1,6 @@
-//! Work unit: one cube of the sort with its nodes and faces, in surface indices. It lives on the master.
+//! Work unit: one cube of the sort with its nodes and faces, in surface indices. It lives where it was sorted.
+
+use serde::{Deserialize, Serialize};
 
 use super::pair::Kind;
 
@@ -28,7 +30,7 @@ impl WorkUnit {
 }
 
 /// How units came out of a sort.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Census {
     /// Number of units.
     pub units: usize,
@@ -55,5 +57,21 @@ impl Census {
             faces: range(&|unit| unit.faces.len()),
             interactions: units.iter().map(|unit| unit.interactions).sum(),
         }
+    }
+
+    /// Takes in the units of another worker's sort.
+    pub fn merge(&mut self, other: &Self) {
+        if other.units == 0 || self.units == 0 {
+            *self = if self.units == 0 { *other } else { *self };
+            return;
+        }
+        let (n, m) = (self.units as f64, other.units as f64);
+        let join = |a: (usize, f64, usize), b: (usize, f64, usize)| {
+            (a.0.min(b.0), (a.1 * n + b.1 * m) / (n + m), a.2.max(b.2))
+        };
+        self.nodes = join(self.nodes, other.nodes);
+        self.faces = join(self.faces, other.faces);
+        self.units += other.units;
+        self.interactions += other.interactions;
     }
 }

@@ -32,6 +32,26 @@ impl Domain {
         Ok(out)
     }
 
+    /// Positions of `nodes` (global).
+    ///
+    /// # Errors
+    /// If a node is not held here.
+    pub fn positions(&self, nodes: impl Iterator<Item = u32>) -> Result<Vec<[f64; 3]>, String> {
+        let of_node = |node: u32| {
+            let copies = self.copy_index.get(node);
+            let &(held_block, local) =
+                copies.as_slice().first().ok_or_else(|| format!("node {node} of the patch is not held"))?;
+            let block = &self.held_blocks[held_block as usize].block;
+            Ok([0, 1, 2].map(|a: usize| block.x[a][local as usize]))
+        };
+        nodes.map(of_node).collect()
+    }
+
+    /// Whether a sub-domain here has a node (global).
+    pub fn holds(&self, node: u32) -> bool {
+        !self.copy_index.get(node).as_slice().is_empty()
+    }
+
     /// Positions of the owned surface nodes in the order the master expects; a sort will use them.
     pub fn gather(&mut self, meter: &dyn Meter) -> Vec<f64> {
         self.order.deal(&mut self.held_blocks, meter, |held_block| {

@@ -8,7 +8,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{Domain, Meter, bodies, ghosts::Ghosts, held_block::HeldBlock, touch::Places};
+use super::{Added, Domain, Meter, bodies, ghosts::Ghosts, held_block::HeldBlock, touch::Places};
 use crate::{
     contact::{Batch, BatchNode},
     lanes::SET,
@@ -26,6 +26,13 @@ pub struct Plan {
     pub ghosts: Vec<Ghost>,
     /// Global nodes whose state this worker sends to others when the plan starts to act.
     pub send: Vec<u32>,
+    /// Where workers sort themselves: what ghosts add to the exchange; `exchange` and `neighbours` are empty until the worker has put both
+    /// together ([`Standing::with`](super::Standing::with)).
+    pub added: Option<Added>,
+    /// On route direct: to whom each of them goes.
+    pub gives: Vec<Handed>,
+    /// On route direct: from whom the state of each ghost comes.
+    pub takes: Vec<Handed>,
     /// Whether moments travel behind the forces of each node: six numbers instead of three.
     pub moments: bool,
     /// Numbers that contact keeps of each node, which travel behind those.
@@ -52,6 +59,15 @@ pub struct Neighbour {
     /// Positions in [`Plan::exchange`] of the nodes that both hold, ascending; both sides list them in the same order
     /// of nodes.
     pub shared: Vec<u32>,
+}
+
+/// Nodes whose state one worker sends another when a plan starts to act.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Handed {
+    /// The other worker's index among those of the job.
+    pub worker: u32,
+    /// Positions in [`Plan::send`] of the one and in [`Plan::ghosts`] of the other, in the same order of nodes.
+    pub places: Vec<u32>,
 }
 
 /// What integrating a ghost needs beside its position and velocity.

@@ -7,6 +7,7 @@ mod edges;
 mod force;
 mod particles;
 mod patch;
+mod patches;
 mod sort;
 mod surface;
 mod ties;

@@ -1,0 +1,113 @@
+//! Sorts what a worker holds of the surface: its patch, where it was at each gathering, and what came of the sorts that do not act yet.
+
+use std::collections::BTreeMap;
+
+use mechanics::{
+    contact::{Batch, Patch, PlacedPatch, Settings, patch},
+    cycle::{Domain, Plan},
+};
+use protocol::message::{Around, SortedPatch, Sorting};
+
+/// A worker's patch and its sorts.
+pub struct Sorter {
+    settings: Settings,
+    patch: Patch,
+    sorted: Vec<u32>,
+    excluded: Vec<(u32, u32)>,
+    /// Of each worker around: the faces that go to it at a gathering.
+    near: Vec<(u32, Vec<u32>)>,
+    /// Where patch nodes were, by the cycle of a gathering whose plan does not act yet.
+    gathered: BTreeMap<u64, Vec<[f64; 3]>>,
+    /// What came of such gatherings.
+    batches: BTreeMap<u64, Option<Batch>>,
+}
+
+impl Sorter {
+    /// At the start of an epoch.
+    ///
+    /// # Errors
+    /// If the patch is not sound, has a node that `domain` does not hold, or there is no contact.
+    pub fn new(sorting: Sorting, settings: Option<&Settings>, domain: &Domain) -> Result<Self, String> {
+        let Sorting { patch, sorted, excluded, around, .. } = sorting;
+        let settings = settings.ok_or("a patch to sort without contact")?.clone();
+        let n_nodes = patch.nodes.len();
+        let in_order = sorted.is_sorted_by(|a, b| a < b) && excluded.is_sorted();
+        if !patch.is_sound(settings.n_parts()) || !in_order || sorted.iter().any(|&n| n as usize >= n_nodes) {
+            return Err("a patch with an index out of range or lists out of order".to_owned());
+        }
+        let mut sorter = Self {
+            settings,
+            patch,
+            sorted,
+            excluded,
+            near: Vec::new(),
+            gathered: BTreeMap::new(),
+            batches: BTreeMap::new(),
+        };
+        let x = sorter.positions(domain)?;
+        sorter.find_near(&around, &x);
+        Ok(sorter)
+    }
+
+    fn positions(&self, domain: &Domain) -> Result<Vec<[f64; 3]>, String> {
+        domain.positions(self.patch.nodes.iter().map(|node| node.global))
+    }
+
+    /// Which faces go to whom until the next plan acts, by the positions of the gathering whose plan acts now.
+    fn find_near(&mut self, around: &[Around], x: &[[f64; 3]]) {
+        let distance = patch::margin(&self.settings);
+        let near = |of: &Around| (of.worker, self.patch.near(x, &of.boxes, &self.settings, distance));
+        self.near = around.iter().map(near).collect();
+    }
+
+    /// Notes where the patch is at the start of a cycle that gathers, and gives what goes to the workers around.
+    ///
+    /// # Errors
+    /// As [`Domain::positions`].
+    pub fn spread(&mut self, cycle: u64, domain: &Domain) -> Result<Vec<(u32, PlacedPatch)>, String> {
+        let x = self.positions(domain)?;
+        let patches = self.near.iter().map(|(to, faces)| (*to, self.patch.placed(faces, &x))).collect();
+        self.gathered.insert(cycle, x);
+        Ok(patches)
+    }
+
+    /// Sorts the patch of a gathering with those of the workers around.
+    ///
+    /// # Errors
+    /// If positions were not gathered in that cycle.
+    pub fn sort(
+        &mut self,
+        gathered_at: u64,
+        others: &[PlacedPatch],
+        domain: &Domain,
+    ) -> Result<SortedPatch, String> {
+        let x = self.gathered.get(&gathered_at);
+        let x = x.ok_or_else(|| format!("a sort of cycle {gathered_at}, which gathered no positions"))?;
+        let (patch, settings) = (&self.patch, &self.settings);
+        let sorted = patch::sort(patch, &self.sorted, x, others, settings, &self.excluded);
+        let nodes = sorted.batch.iter().flat_map(|batch| &batch.nodes).map(|node| node.global);
+        let report = SortedPatch {
+            ghosts: nodes.filter(|&node| !domain.holds(node)).collect(),
+            nodes: [self.sorted.len() as u64, sorted.seen as u64],
+            census: sorted.census,
+            weight: sorted.weight,
+            boxes: patch.boxes(x),
+        };
+        self.batches.insert(gathered_at, sorted.batch);
+        Ok(report)
+    }
+
+    /// The plan of a gathering begins to act: gives it its batch, and forgets what was before.
+    ///
+    /// # Errors
+    /// If that gathering was not sorted here.
+    pub fn complete(&mut self, gathered_at: u64, around: &[Around], plan: &mut Plan) -> Result<(), String> {
+        let missing = || format!("a plan of cycle {gathered_at}, which was not sorted here");
+        let x = self.gathered.remove(&gathered_at).ok_or_else(missing)?;
+        plan.batch = self.batches.remove(&gathered_at).ok_or_else(missing)?;
+        self.find_near(around, &x);
+        self.gathered.retain(|&cycle, _| cycle > gathered_at);
+        self.batches.retain(|&cycle, _| cycle > gathered_at);
+        Ok(())
+    }
+}
