@@ -247,10 +247,10 @@ pub struct Report {
     pub elements: Vec<Row>,
     /// Benchmark 2: contact of a surface node in a cycle, sorts aside (ns).
     pub contact_node_ns: Spread,
-    /// A pair that a cycle looks at (ns).
-    pub pair_ns: f64,
-    /// A surface node in a sort (ns).
-    pub sort_node_ns: f64,
+    /// A pair that a cycle looks at (ns); none where no pair was there.
+    pub pair_ns: Option<f64>,
+    /// A surface node in a sort (ns); none where there was none.
+    pub sort_node_ns: Option<f64>,
     /// A short message over loopback, at each end (ns).
     pub message_ns: f64,
     /// A byte of a long one, at each end (ns).
@@ -323,8 +323,8 @@ fn measured(rounds: u32, side: u32, lanes: Option<Width>) -> Result<Report, Stri
         speed_of_a_thread: speed_of(elements[0].ns.least, 1),
         elements,
         contact_node_ns: Spread::of(contact),
-        pair_ns: pair * element_ns,
-        sort_node_ns: sort * pair * element_ns,
+        pair_ns: pair.map(|pair| pair * element_ns),
+        sort_node_ns: pair.zip(sort).map(|(pair, sort)| sort * pair * element_ns),
         message_ns,
         byte_ns,
         serial_shares: serial.map(Spread::of),
@@ -359,8 +359,16 @@ fn table(report: &Report) -> String {
     }
     line("surface node in contact, sorts aside", report.contact_node_ns, USUAL_OF_CONTACT);
     let alone = |value: f64| Spread { median: value, least: value };
-    line("pair of contact that a cycle looks at", alone(report.pair_ns), "");
-    line("surface node in a sort", alone(report.sort_node_ns), "");
+    for (name, ns) in [
+        ("pair of contact that a cycle looks at", report.pair_ns),
+        ("surface node in a sort", report.sort_node_ns),
+    ] {
+        line(
+            name,
+            alone(ns.unwrap_or(f64::NAN)),
+            if ns.is_none() { "not measured: none was there" } else { "" },
+        );
+    }
     line("short message over loopback, at each end", alone(report.message_ns), "");
     lines.push(format!(
         "  {:<50}{:>9.3}{:>9.3}",
@@ -437,8 +445,8 @@ mod tests {
         let of_elements = report.elements.iter().map(|row| (row.name.as_str(), row.ns.least));
         let others = [
             ("contact", report.contact_node_ns.least),
-            ("pair", report.pair_ns),
-            ("sort", report.sort_node_ns),
+            ("pair", report.pair_ns.unwrap_or(f64::NAN)),
+            ("sort", report.sort_node_ns.unwrap_or(f64::NAN)),
             ("message", report.message_ns),
             ("speed", report.speed_of_a_thread),
         ];

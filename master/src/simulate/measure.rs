@@ -34,12 +34,12 @@ pub struct Measured {
     pub element_ns: f64,
     /// Integrating a node, in elements.
     pub node: f64,
-    /// A node-face pair in a cycle, in elements.
-    pub pair: f64,
-    /// A pair of a new plan, in pairs.
-    pub search: f64,
-    /// A surface node in a sort, in pairs.
-    pub sort: f64,
+    /// A node-face pair in a cycle, in elements; none where the run had no pairs.
+    pub pair: Option<f64>,
+    /// A pair of a new plan, in pairs; none where no plan with pairs began to act.
+    pub search: Option<f64>,
+    /// A surface node in a sort, in pairs; none where there was no sort, or no pair.
+    pub sort: Option<f64>,
     /// A short message over loopback TCP, at each end (ns).
     pub message_ns: f64,
     /// A byte of a long one, at each end (ns).
@@ -48,6 +48,9 @@ pub struct Measured {
 
 /// Cycles between sorts: lists of contact may last longer than the whole run, which would then have no sort to measure.
 const SORTS_EVERY: u64 = 8;
+
+/// Cycles that a run is given at least beyond that in which the first plan of a forced sort acts.
+const CYCLES_OF_A_PLAN: u64 = 2;
 
 /// Bytes of the short and the long message that are timed.
 const MESSAGES: [usize; 2] = [64, 256 * 1024];
@@ -59,11 +62,24 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Measures once.
+/// The problem with as many cycles as a sort and its plan take, if it would end before.
+fn long_enough(model: &Arc<Model>) -> Arc<Model> {
+    let control = &model.setup.control;
+    let least = SORTS_EVERY + u64::from(control.sort_lag) + CYCLES_OF_A_PLAN;
+    if model.setup.contact.is_none() || control.end_cycle >= least {
+        return Arc::clone(model);
+    }
+    let mut longer = Model::clone(model);
+    longer.setup.control.end_cycle = least;
+    Arc::new(longer)
+}
+
+/// Measures once. What a problem without contact, or one whose end time comes before the plan of a sort acts, does not show is none.
 ///
 /// # Errors
-/// Whatever keeps the runs from their end, a problem without sorts, sockets.
+/// Whatever keeps the runs from their end, a run without elements, sockets.
 pub fn once(model: &Arc<Model>, hosts: usize, lanes: Option<Width>) -> Result<Measured, String> {
+    let model = &long_enough(model);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| e.to_string())?;
     let machines = |hosts: usize| Machines {
         speeds: vec![1.0; hosts],
@@ -99,17 +115,18 @@ pub fn once(model: &Arc<Model>, hosts: usize, lanes: Option<Width>) -> Result<Me
     let pair = median(per(Kind::Border, |load| load.pairs));
     let install = median(per(Kind::Install, |load| load.pairs));
     let sort = median(run(hosts)?.sort_ns);
-    if element <= 0.0 || pair <= 0.0 || install <= 0.0 || sort <= 0.0 {
-        return Err("no plan of contact began to act in the run: take a deck with contact, or more --cycles"
-            .to_owned());
+    if element <= 0.0 {
+        return Err("the run computed no element: take a deck with elements, and more --cycles".to_owned());
     }
     let [message, byte] = messages().map_err(|e| format!("loopback: {e}"))?;
+    let pair = (pair > 0.0).then_some(pair);
+    let in_pairs = |ns: f64| pair.filter(|_| ns > 0.0).map(|pair| ns / pair);
     Ok(Measured {
         element_ns: element,
         node: node / element,
-        pair: pair / element,
-        search: (install - pair) / pair,
-        sort: sort / pair,
+        pair: pair.map(|pair| pair / element),
+        search: in_pairs(install).map(|all| all - 1.0),
+        sort: in_pairs(sort),
         message_ns: message,
         byte_ns: byte,
     })
@@ -185,12 +202,16 @@ pub fn run(
 ) -> Result<(Vec<Measured>, Measured), String> {
     let all: Vec<Measured> = (0..repetitions).map(|_| once(model, hosts, lanes)).collect::<Result<_, _>>()?;
     let of = |get: fn(&Measured) -> f64| median(all.iter().map(get).collect());
+    let known = |get: fn(&Measured) -> Option<f64>| {
+        let values: Vec<f64> = all.iter().filter_map(get).collect();
+        (!values.is_empty()).then(|| median(values))
+    };
     let medians = Measured {
         element_ns: of(|m| m.element_ns),
         node: of(|m| m.node),
-        pair: of(|m| m.pair),
-        search: of(|m| m.search),
-        sort: of(|m| m.sort),
+        pair: known(|m| m.pair),
+        search: known(|m| m.search),
+        sort: known(|m| m.sort),
         message_ns: of(|m| m.message_ns),
         byte_ns: of(|m| m.byte_ns),
     };
@@ -203,12 +224,76 @@ pub fn print(all: &[Measured], medians: &Measured) -> String {
         "            element ns   node el.  pair el.  search pairs  sort pairs  message ns  byte ns\n"
             .to_owned();
     let named = all.iter().enumerate().map(|(i, m)| (format!("{}", i + 1), m));
+    let or_none = |value: Option<f64>, digits: usize| match value {
+        Some(value) => format!("{value:.digits$}"),
+        None => "-".to_owned(),
+    };
     for (name, m) in named.chain([("median".to_owned(), medians)]) {
         let _ = writeln!(
             text,
-            "{name:>10}  {:10.1}  {:9.3}  {:8.3}  {:12.2}  {:10.2}  {:10.0}  {:7.3}",
-            m.element_ns, m.node, m.pair, m.search, m.sort, m.message_ns, m.byte_ns
+            "{name:>10}  {:10.1}  {:9.3}  {:>8}  {:>12}  {:>10}  {:10.0}  {:7.3}",
+            m.element_ns,
+            m.node,
+            or_none(m.pair, 3),
+            or_none(m.search, 2),
+            or_none(m.sort, 2),
+            m.message_ns,
+            m.byte_ns
+        );
+    }
+    let missing: Vec<&str> = [("pair", medians.pair), ("search", medians.search), ("sort", medians.sort)]
+        .into_iter()
+        .filter_map(|(name, value)| value.is_none().then_some(name))
+        .collect();
+    if !missing.is_empty() {
+        let _ = writeln!(
+            text,
+            "not measured: {}; the run had no such work: take a deck with contact whose end time leaves room for a sort and its plan",
+            missing.join(", ")
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two plates of a few elements, which touch or are joined, that end in the second cycle if nobody lets them run on.
+    fn plates(between: &str) -> Arc<Model> {
+        let part = |name: &str, base: f64, speed: i32| {
+            format!(
+                "[[part]]\nname = \"{name}\"\nmaterial = \"STEEL_1006\"\nvelocity = [0, 0, {speed}]\n\
+                 box = {{ origin = [0, 0, {base}], size = [4, 4, 2], cells = [4, 4, 2] }}\n"
+            )
+        };
+        let gap = if between.contains("contact") { 0.1 } else { 0.0 };
+        let text = format!(
+            "title = \"plates\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n{}{}{between}",
+            part("target", 0.0, 0),
+            part("projectile", 2.0 + gap, -100)
+        );
+        let mut model = deck::read(&text, "plates").expect("a sound deck");
+        model.setup.control.end_cycle = 2;
+        Arc::new(model)
+    }
+
+    #[test]
+    fn a_short_run_goes_on_until_a_plan_of_contact_has_begun_to_act() {
+        let model = plates("[contact]\ngap_length = 0.1\n");
+        let measured = once(&model, 2, Some(Width::Scalar)).expect("a run to its end");
+        for (name, value) in [("pair", measured.pair), ("search", measured.search), ("sort", measured.sort)] {
+            assert!(value.is_some_and(f64::is_finite), "{name}: {value:?}");
+        }
+        assert!(!print(&[], &measured).contains("not measured"));
+    }
+
+    #[test]
+    fn what_a_deck_without_contact_does_not_show_is_named() {
+        let model = plates("[[join]]\nparts = [\"target\", \"projectile\"]\n");
+        let (_, measured) = run(&model, 2, Some(Width::Scalar), 1).expect("a run to its end");
+        assert!(measured.element_ns > 0.0 && measured.node > 0.0 && measured.message_ns > 0.0);
+        assert_eq!([measured.pair, measured.search, measured.sort], [None; 3]);
+        assert!(print(&[], &measured).contains("not measured: pair, search, sort;"));
+    }
 }
