@@ -295,8 +295,6 @@ pub struct SortedPatch {
     pub nodes: [u64; 2],
     /// Of its units.
     pub census: Census,
-    /// Pairs that a cycle looks at.
-    pub weight: u64,
     /// Where its patch was.
     pub boxes: Vec<PartBox>,
 }

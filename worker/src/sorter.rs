@@ -26,7 +26,7 @@ impl Sorter {
     /// At the start of an epoch.
     ///
     /// # Errors
-    /// If the patch is not sound, has a node that `domain` does not hold, or there is no contact.
+    /// If the patch is not sound, has a node that `domain` does not hold, is near a part that there is not, or there is no contact.
     pub fn new(sorting: Sorting, settings: Option<&Settings>, domain: &Domain) -> Result<Self, String> {
         let Sorting { patch, sorted, excluded, around, .. } = sorting;
         let settings = settings.ok_or("a patch to sort without contact")?.clone();
@@ -45,7 +45,7 @@ impl Sorter {
             batches: BTreeMap::new(),
         };
         let x = sorter.positions(domain)?;
-        sorter.find_near(&around, &x);
+        sorter.find_near(&around, &x)?;
         Ok(sorter)
     }
 
@@ -54,10 +54,20 @@ impl Sorter {
     }
 
     /// Which faces go to whom until the next plan acts, by the positions of the gathering whose plan acts now.
-    fn find_near(&mut self, around: &[Around], x: &[[f64; 3]]) {
+    ///
+    /// # Errors
+    /// If a box is of a part that there is not.
+    fn find_near(&mut self, around: &[Around], x: &[[f64; 3]]) -> Result<(), String> {
+        let n_parts = self.settings.n_parts();
+        if let Some(of) =
+            around.iter().flat_map(|around| &around.boxes).find(|of| of.part as usize >= n_parts)
+        {
+            return Err(format!("a patch of part {} is around, there are {n_parts} parts", of.part));
+        }
         let distance = patch::margin(&self.settings);
         let near = |of: &Around| (of.worker, self.patch.near(x, &of.boxes, &self.settings, distance));
         self.near = around.iter().map(near).collect();
+        Ok(())
     }
 
     /// Notes where the patch is at the start of a cycle that gathers, and gives what goes to the workers around.
@@ -90,7 +100,6 @@ impl Sorter {
             ghosts: nodes.filter(|&node| !domain.holds(node)).collect(),
             nodes: [self.sorted.len() as u64, sorted.seen as u64],
             census: sorted.census,
-            weight: sorted.weight,
             boxes: patch.boxes(x),
         };
         self.batches.insert(gathered_at, sorted.batch);
@@ -100,12 +109,12 @@ impl Sorter {
     /// The plan of a gathering begins to act: gives it its batch, and forgets what was before.
     ///
     /// # Errors
-    /// If that gathering was not sorted here.
+    /// If that gathering was not sorted here, or a part that there is not is around.
     pub fn complete(&mut self, gathered_at: u64, around: &[Around], plan: &mut Plan) -> Result<(), String> {
         let missing = || format!("a plan of cycle {gathered_at}, which was not sorted here");
         let x = self.gathered.remove(&gathered_at).ok_or_else(missing)?;
         plan.batch = self.batches.remove(&gathered_at).ok_or_else(missing)?;
-        self.find_near(around, &x);
+        self.find_near(around, &x)?;
         self.gathered.retain(|&cycle, _| cycle > gathered_at);
         self.batches.retain(|&cycle, _| cycle > gathered_at);
         Ok(())

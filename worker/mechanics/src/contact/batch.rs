@@ -146,14 +146,20 @@ impl Batch {
     pub fn is_sound(&self, n_parts: usize) -> bool {
         let (n_nodes, n_faces) = (self.nodes.len(), self.faces.len());
         let below = |indices: &[u32], n: usize| indices.iter().all(|&i| (i as usize) < n);
-        self.nodes.iter().all(|n| (n.part as usize) < n_parts && n.mass > 0.0)
-            && self.faces.iter().all(|f| (f.part as usize) < n_parts && below(&f.nodes, n_nodes))
+        are_sound(&self.nodes, &self.faces, n_parts)
             && self.units.iter().all(|u| below(&u.nodes, n_nodes) && below(&u.faces, n_faces))
-            && self.nodes.is_sorted_by(|a, b| a.global < b.global)
-            && self.faces.is_sorted_by(|a, b| a.id < b.id)
             && self.excluded.is_sorted()
             && self.listed.is_sound(n_nodes, n_parts)
     }
+}
+
+/// Whether nodes and faces are in order, their parts among `n_parts`, masses positive and corners among the nodes.
+pub(super) fn are_sound(nodes: &[BatchNode], faces: &[BatchFace], n_parts: usize) -> bool {
+    let is_corner = |&n: &u32| (n as usize) < nodes.len();
+    nodes.iter().all(|n| (n.part as usize) < n_parts && n.mass > 0.0)
+        && faces.iter().all(|f| (f.part as usize) < n_parts && f.nodes.iter().all(is_corner))
+        && nodes.is_sorted_by(|a, b| a.global < b.global)
+        && faces.is_sorted_by(|a, b| a.id < b.id)
 }
 
 /// What a batch has of the pairs that are listed one by one, and of what came out last.

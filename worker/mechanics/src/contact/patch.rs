@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Settings,
-    batch::{Batch, BatchFace, BatchNode},
+    batch::{self, Batch, BatchFace, BatchNode},
     kinds,
     search::{Exclusions, cull},
     surface::{Exposed, Face, Surface},
@@ -67,8 +67,6 @@ pub struct PatchSort {
     /// The units; none if nothing is near.
     pub batch: Option<Batch>,
     pub census: Census,
-    /// Pairs that a cycle looks at.
-    pub weight: u64,
     /// Surface nodes that were looked at.
     pub seen: usize,
 }
@@ -102,7 +100,7 @@ impl Patch {
 
     /// Whether every index is in range, parts among `n_parts`, and nodes and faces in order.
     pub fn is_sound(&self, n_parts: usize) -> bool {
-        Batch { nodes: self.nodes.clone(), faces: self.faces.clone(), ..Batch::default() }.is_sound(n_parts)
+        batch::are_sound(&self.nodes, &self.faces, n_parts)
     }
 
     /// The boxes of the parts that it has something of, ascending. `x` by patch node.
@@ -197,17 +195,17 @@ pub fn sort(
     }
     units.retain(|unit| unit.interactions > 0);
     let census = Census::of(&units);
-    let weight = cull(&mut units, &surface, &x, settings, &exclusions).iter().sum();
+    cull(&mut units, &surface, &x, settings, &exclusions);
     let units: Vec<&WorkUnit> = units.iter().filter(|unit| !unit.is_empty()).collect();
     if units.is_empty() {
-        return PatchSort { batch: None, census, weight, seen: x.len() };
+        return PatchSort { batch: None, census, seen: x.len() };
     }
     let mass = |node: u32| masses[surface.nodes.partition_point(|&other| other < node)];
     let mut batch = Batch::gather(&surface, &units, &mass, &exclusions);
     let id = |face: u32| surface.faces[face as usize].element;
     batch.faces.iter_mut().for_each(|face| face.id = id(face.id));
     batch.excluded.iter_mut().for_each(|(_, face)| *face = id(*face));
-    PatchSort { batch: Some(batch), census, weight, seen: x.len() }
+    PatchSort { batch: Some(batch), census, seen: x.len() }
 }
 
 /// Key of a face among those of patches.
