@@ -36,6 +36,19 @@ pub(crate) fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// Square of a distance. Its products are not fused: where the processor may lack the instruction each fused one is a call, and what asks
+/// for edges asks for those of all elements and needs no last place.
+pub(crate) fn distance_square(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let [x, y, z] = sub(b, a);
+    x * x + y * y + z * z
+}
+
+/// Length of the longest edge of a hexahedron.
+pub(crate) fn longest_edge(x: &[[f64; 3]; 8]) -> f64 {
+    let squares = EDGES.iter().map(|&[a, b]| distance_square(x[a], x[b]));
+    squares.fold(0.0, f64::max).sqrt()
+}
+
 /// The direction of a vector; none where it has no length.
 pub(crate) fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
     let long = norm(v);

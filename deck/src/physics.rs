@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::{
-    geometry::{EDGES, cross, dot, norm, scaled, sub},
+    geometry::{cross, longest_edge, norm, scaled, sub},
     model::Model,
     units::Units,
 };
@@ -257,7 +257,7 @@ impl Sums {
         let viscosity = model.setup.control.linear_viscosity;
         for (e, &v) in (first..).zip(volumes) {
             let corners = part.corners(e);
-            let x = corners.map(|n| model.mesh.positions[n as usize]);
+            let x = part.corners_at(e, &model.mesh.positions);
             let longest = longest_edge(&x);
             let thinnest = match &part.topology {
                 Topology::Shells { section, thicknesses, .. } => {
@@ -298,31 +298,33 @@ fn largest_side(x: &[[f64; 3]; 8]) -> f64 {
     [[a, b, c], [a, b, d], [b, c, d], [c, a, d]].map(area).into_iter().fold(0.0, f64::max)
 }
 
-fn longest_edge(x: &[[f64; 3]; 8]) -> f64 {
-    let square = |&[a, b]: &[usize; 2]| {
-        let along = sub(x[b], x[a]);
-        dot(along, along)
-    };
-    EDGES.iter().map(square).fold(0.0, f64::max).sqrt()
-}
-
 /// The thinnest way through a hexahedron, as the time step sees it: twice the least singular value of the Jacobian in its middle.
 fn thinnest_way(x: &[[f64; 3]; 8]) -> f64 {
     // Columns of the Jacobian: half the vectors that join the middles of opposite faces.
-    let columns: [[f64; 3]; 3] = std::array::from_fn(|i| {
-        std::array::from_fn(|a| 0.125 * x.iter().zip(CORNERS).map(|(x, sign)| sign[i] * x[a]).sum::<f64>())
-    });
+    let mut columns = [[0.0; 3]; 3];
+    for (x, sign) in x.iter().zip(CORNERS) {
+        for (column, sign) in columns.iter_mut().zip(sign) {
+            for (sum, x) in column.iter_mut().zip(x) {
+                *sum += 0.125 * sign * x;
+            }
+        }
+    }
     let [u, v, w] = columns;
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let m = [dot(u, u), dot(v, v), dot(w, w), dot(u, v), dot(v, w), dot(w, u)];
     2.0 * least_eigenvalue(m).max(0.0).sqrt()
 }
 
+/// What of a matrix beside its diagonal counts for nothing, over the mean of that.
+const NEGLIGIBLE: f64 = 1e-13;
+
 /// The least eigenvalue of a symmetric matrix xx, yy, zz, xy, yz, zx: the trigonometric solution of its cubic.
 fn least_eigenvalue([xx, yy, zz, xy, yz, zx]: [f64; 6]) -> f64 {
-    if [xy, yz, zx] == [0.0; 3] {
+    let mean = (xx + yy + zz) / 3.0;
+    // An eigenvalue differs from the diagonal by no more than what lies beside it: in a block of a deck, by rounding.
+    if xy.abs().max(yz.abs()).max(zx.abs()) <= NEGLIGIBLE * mean {
         return xx.min(yy).min(zz);
     }
-    let mean = (xx + yy + zz) / 3.0;
     let (a, b, c) = (xx - mean, yy - mean, zz - mean);
     let square = (a * a + b * b + c * c + 2.0 * (xy * xy + yz * yz + zx * zx)) / 6.0;
     let p = square.sqrt();

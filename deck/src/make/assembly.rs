@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{merge::merge, names::Names, node_ids::NodeIds, part::PartDraft};
 use crate::{
-    geometry::{EDGES, dot, sub},
+    geometry::{EDGES, distance_square, dot},
     log::Log,
     mesh_file::MeshFile,
     place::Place,
@@ -356,8 +356,7 @@ fn edges(positions: &[[f64; 3]], part: &Part) -> (f64, f64) {
     let of_element = |e: usize| {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         let mut see = |a: u32, b: u32| {
-            let along = sub(positions[a as usize], positions[b as usize]);
-            let square = dot(along, along);
+            let square = distance_square(positions[a as usize], positions[b as usize]);
             (low, high) = (low.min(square), high.max(square));
         };
         if let Topology::Tetrahedra { .. } = part.topology {

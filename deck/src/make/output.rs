@@ -207,7 +207,7 @@ impl Finder<'_> {
         let mut best: Option<(u32, usize, f64)> = None;
         for &p in selected {
             for e in 0..mesh.parts[p].n_elements() {
-                let corners = mesh.parts[p].corners(e).map(|n| mesh.positions[n as usize]);
+                let corners = mesh.parts[p].corners_at(e, &mesh.positions);
                 let centre = [0, 1, 2].map(|a| 0.125 * corners.iter().map(|x| x[a]).sum::<f64>());
                 let distance = norm(sub(centre, point));
                 if best.is_none_or(|(_, _, least)| distance < least) {

@@ -94,7 +94,7 @@ fn by_plane(
         let part: &Part = &mesh.parts[p];
         let near = ON_PLANE * assembly.smallest_edge[p];
         for e in 0..part.n_elements() {
-            let corners = part.corners(e).map(|n| mesh.positions[n as usize]);
+            let corners = part.corners_at(e, &mesh.positions);
             let nodes = part.nodes_of(e);
             let is_ahead = |i: usize| dot(sub(mesh.positions[nodes[i] as usize], point), normal) >= -near;
             let centre = [0, 1, 2].map(|a| 0.125 * corners.iter().map(|x| x[a]).sum::<f64>());

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::{assembly::Assembly, part::PartDraft, surface::Face, zones};
 use crate::{
     fault::short,
-    geometry::{EDGES, cross, dot, norm, sub, worst_corner},
+    geometry::{cross, longest_edge, norm, sub, worst_corner},
     log::Log,
     typed::mesh::Numbers,
 };
@@ -208,7 +208,7 @@ fn is_unturned(
     section: &beam2::BeamSection,
     assembly: &Assembly,
 ) -> bool {
-    let [a, b, ..] = part.corners(e).map(|node| assembly.mesh.positions[node as usize]);
+    let [a, b, ..] = part.corners_at(e, &assembly.mesh.positions);
     let along = sub(b, a);
     let is_across = norm(cross(along, across)) > 1e-6 * norm(along) * norm(across);
     let alike = |[one, other]: [f64; 2]| (one - other).abs() <= 1e-9 * one.abs();
@@ -228,12 +228,8 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
         let bad: Vec<usize> = (0..volumes.len())
             .into_par_iter()
             .filter(|&e| {
-                let corners = part.corners(e).map(|node| assembly.mesh.positions[node as usize]);
-                let square = |[a, b]: &[usize; 2]| {
-                    let along = sub(corners[*a], corners[*b]);
-                    dot(along, along)
-                };
-                let edge = EDGES.iter().map(square).fold(0.0, f64::max).sqrt();
+                let corners = part.corners_at(e, &assembly.mesh.positions);
+                let edge = longest_edge(&corners);
                 let least = if is_spring { 0.0 } else { FLAT * edge * edge * edge };
                 !(volumes[e] > least && volumes[e].is_finite())
             })

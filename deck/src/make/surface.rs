@@ -26,38 +26,37 @@ pub(super) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
     let side = FACES.map(side_of);
     for (p, part) in assembly.mesh.parts.iter().enumerate() {
         let first = keyed.len();
-        for e in 0..part.n_elements() {
-            if let Topology::Tetrahedra { .. } = part.topology {
-                let (own, element) = (part.nodes_of(e), (offsets[p] + e) as u32);
-                for &side in part.sides() {
-                    let nodes = part.side(side).map(|node| own[node]);
-                    let Some(key) = key_of(nodes) else { continue };
-                    let face = Face { part: p as u32, element, side: side as u8, nodes, inside: false };
-                    keyed.push((key, order, face));
-                    order += 1;
+        let mut add = |element: usize, side: u8, nodes: [u32; 4]| {
+            let Some(key) = key_of(nodes) else { return };
+            let element = (offsets[p] + element) as u32;
+            keyed.push((key, order, Face { part: p as u32, element, side, nodes, inside: false }));
+            order += 1;
+        };
+        match &part.topology {
+            Topology::Tetrahedra { .. } => {
+                for e in 0..part.n_elements() {
+                    let own = part.nodes_of(e);
+                    for &side in part.sides() {
+                        add(e, side as u8, part.side(side).map(|node| own[node]));
+                    }
                 }
-                continue;
             }
-            let corners = part.corners(e);
-            for (f, face) in FACES.iter().enumerate() {
-                // A shell is one face, its upper side.
-                if !part.sides().contains(&f) {
-                    continue;
+            Topology::Structured { cells } => {
+                for e in outer_cells(*cells) {
+                    let corners = part.corners(e);
+                    for (f, face) in FACES.iter().enumerate().filter(|(f, _)| on_side(*cells, e, *f)) {
+                        add(e, side[f], face.map(|corner| corners[corner]));
+                    }
                 }
-                if let Topology::Structured { cells } = &part.topology
-                    && !on_side(*cells, e, f)
-                {
-                    continue;
+            }
+            _ => {
+                for e in 0..part.n_elements() {
+                    let corners = part.corners(e);
+                    // A shell is one face, its upper side.
+                    for (f, face) in FACES.iter().enumerate().filter(|(f, _)| part.sides().contains(f)) {
+                        add(e, side[f], face.map(|corner| corners[corner]));
+                    }
                 }
-                let nodes = face.map(|c| corners[c]);
-                let element = (offsets[p] + e) as u32;
-                let Some(key) = key_of(nodes) else { continue };
-                keyed.push((
-                    key,
-                    order,
-                    Face { part: p as u32, element, side: side[f], nodes, inside: false },
-                ));
-                order += 1;
             }
         }
         if matches!(part.topology, Topology::Explicit { .. } | Topology::Tetrahedra { .. }) {
@@ -102,6 +101,17 @@ fn side_of(mut corners: [usize; 4]) -> u8 {
     mechanics::mesh::FACES.iter().position(same).expect("a hexahedron has six faces") as u8
 }
 
+/// Elements of a grid that lie on one of its sides, ascending.
+fn outer_cells(cells: [u32; 3]) -> impl Iterator<Item = usize> {
+    let [ni, nj, nk] = cells.map(|c| c as usize);
+    (0..nj * nk).flat_map(move |row| {
+        let (j, k) = (row % nj, row / nj);
+        let is_outer = j == 0 || j + 1 == nj || k == 0 || k + 1 == nk;
+        let step = if is_outer || ni < 2 { 1 } else { ni - 1 };
+        (0..ni).step_by(step).map(move |i| i + ni * row)
+    })
+}
+
 /// Whether face `f` of element `e` of a grid lies on the grid's side.
 fn on_side(cells: [u32; 3], e: usize, f: usize) -> bool {
     let [ni, nj, nk] = cells.map(|c| c as usize);
@@ -129,4 +139,19 @@ pub(super) fn smallest_face_dimension(
         }
     }
     (smallest > 0.0 && smallest.is_finite()).then_some(smallest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outer_cells_are_those_with_a_face_on_a_side_of_the_grid() {
+        for cells in [[1, 1, 1], [2, 1, 3], [4, 5, 6], [3, 3, 3], [1, 7, 2], [9, 2, 4]] {
+            let n: u32 = cells.iter().product();
+            let expected: Vec<usize> =
+                (0..n as usize).filter(|&e| (0..6).any(|f| on_side(cells, e, f))).collect();
+            assert_eq!(outer_cells(cells).collect::<Vec<_>>(), expected, "{cells:?}");
+        }
+    }
 }

@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 
 use mechanics::contact::{ROUNDING, Settings};
+use rayon::prelude::*;
 
 use super::{assembly::Assembly, part::PartDraft, surface::Face};
 use crate::{
@@ -139,33 +140,70 @@ fn worst_node(nodes: &Surface<'_>, faces: &Surface<'_>, assembly: &Assembly, gap
         .collect();
     // Columns along z: a face can only be above or near a node whose column it reaches.
     let columns = Columns::of(&candidates, assembly, faces, gap);
-    let mut nearest = vec![f64::INFINITY; candidates.len()];
-    let mut above = vec![0u32; candidates.len()];
-    for face in faces.faces {
+    let none =
+        |within: f64| Seen { nearest: vec![within; candidates.len()], above: vec![0; candidates.len()] };
+    let see = |mut seen: Seen, face: &Face| {
         let corners = face.nodes.map(position);
         let middle = scaled(add(add(corners[0], corners[1]), add(corners[2], corners[3])), 0.25);
         let bounds = Bounds::of(&corners);
-        for &c in columns.of_face(&corners, gap).iter() {
+        columns.of_face(&corners, gap, |c| {
             let x = position(candidates[c as usize]);
-            // No triangle of the face is nearer than the box around it.
-            let may_be_nearer = bounds.least_distance(x) <= nearest[c as usize];
+            let (nearest, above) = (&mut seen.nearest[c as usize], &mut seen.above[c as usize]);
+            // No triangle of the face is nearer than the box around it, and none is crossed beside or below it.
+            let may_be_nearer = bounds.least_distance(x) <= *nearest;
+            let ray = columns.beside(x);
+            let may_cross = bounds.may_be_above(ray);
             for side in 0..4 {
                 let (p, q) = (corners[side], corners[(side + 1) % 4]);
                 if may_be_nearer {
-                    nearest[c as usize] = nearest[c as usize].min(triangle_distance(x, p, q, middle));
+                    *nearest = nearest.min(triangle_distance(x, p, q, middle));
                 }
-                above[c as usize] += u32::from(crosses(columns.beside(x), p, q, middle));
+                *above += u32::from(may_cross && crosses(ray, p, q, middle));
             }
-        }
-    }
+        });
+        seen
+    };
+    // Neither least distances nor counts have an order.
+    let look = |within: f64| {
+        let faces = faces.faces.par_iter().with_min_len(AT_A_TIME);
+        faces.fold(|| none(within), see).reduce(|| none(within), Seen::and)
+    };
+    let is_odd = |above: &u32| above % 2 == 1;
+    let within = gap * (1.0 - ROUNDING);
     // Nothing is inside a shell.
     let part = faces.faces.first().map_or(0, |face| face.part as usize);
     let solid = assembly.mesh.parts[part].section().is_none();
+    let mut seen = look(within);
+    if solid && seen.above.iter().any(is_odd) {
+        // Of nodes inside the one nearest to the surface is named, however deep it is.
+        seen = look(f64::INFINITY);
+    }
+    let Seen { nearest, above } = seen;
     let worst = (0..candidates.len())
-        .map(|c| Worst { node: candidates[c], distance: nearest[c], inside: solid && above[c] % 2 == 1 })
-        .filter(|w| w.inside || w.distance < gap * (1.0 - ROUNDING))
+        .map(|c| Worst { node: candidates[c], distance: nearest[c], inside: solid && is_odd(&above[c]) })
+        .filter(|w| w.inside || w.distance < within)
         .min_by(|a, b| b.inside.cmp(&a.inside).then(a.distance.total_cmp(&b.distance)))?;
     Some(worst)
+}
+
+/// Faces that one thread looks at before it asks for others.
+const AT_A_TIME: usize = 4096;
+
+/// What faces are to the candidates.
+struct Seen {
+    /// The least distance, or what was looked within.
+    nearest: Vec<f64>,
+    /// How many triangles are above.
+    above: Vec<u32>,
+}
+
+impl Seen {
+    /// With what other faces are to them.
+    fn and(mut self, other: Self) -> Self {
+        self.nearest.iter_mut().zip(other.nearest).for_each(|(one, other)| *one = one.min(other));
+        self.above.iter_mut().zip(other.above).for_each(|(one, other)| *one += other);
+        self
+    }
 }
 
 /// The box around a face.
@@ -189,6 +227,12 @@ impl Bounds {
     fn least_distance(&self, x: [f64; 3]) -> f64 {
         let outside = |axis: usize| (self.low[axis] - x[axis]).max(x[axis] - self.high[axis]).max(0.0);
         (1.0 - 1e-9) * norm([0, 1, 2].map(outside))
+    }
+
+    /// Whether a ray from `x` along +z may cross what is in the box.
+    fn may_be_above(&self, x: [f64; 3]) -> bool {
+        let within = |axis: usize| self.low[axis] <= x[axis] && x[axis] <= self.high[axis];
+        within(0) && within(1) && x[2] <= self.high[2]
     }
 }
 
@@ -240,9 +284,9 @@ impl Columns {
         [x[0] + self.aside[0], x[1] + self.aside[1], x[2]]
     }
 
-    /// The nodes in the columns that a face reaches; a face is at most one width across, so these are a
+    /// Looks at the nodes in the columns that a face reaches; a face is at most one width across, so these are a
     /// few columns.
-    fn of_face(&self, corners: &[[f64; 3]; 4], gap: f64) -> Vec<u32> {
+    fn of_face(&self, corners: &[[f64; 3]; 4], gap: f64, mut look: impl FnMut(u32)) {
         let end = |axis: usize, pick: fn(f64, f64) -> f64, start: f64| {
             corners.iter().map(|c| c[axis]).fold(start, pick)
         };
@@ -252,12 +296,10 @@ impl Columns {
         );
         let high =
             self.column(end(0, f64::max, f64::NEG_INFINITY) + gap, end(1, f64::max, f64::NEG_INFINITY) + gap);
-        let mut nodes = Vec::new();
         for i in low[0]..=high[0] {
             for (_, column) in self.columns.range([i, low[1]]..=[i, high[1]]) {
-                nodes.extend_from_slice(column);
+                column.iter().for_each(|&node| look(node));
             }
         }
-        nodes
     }
 }

@@ -198,19 +198,29 @@ impl Part {
     /// corners twice, so that its first two faces are its lower and its upper side and the others vanish. A truss, spring or beam has no face: each of its
     /// two nodes stands for the four corners of an end. A tetrahedron is the hexahedron that collapses to its four corners.
     pub fn corners(&self, e: usize) -> [u32; 8] {
-        match &self.topology {
-            Topology::Structured { cells } => corners_of(*cells, e).map(|local| self.nodes[local as usize]),
-            Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => {
-                hexahedra[e].map(|local| self.nodes[local as usize])
-            }
-            Topology::Tetrahedra { tetrahedra } => {
-                tet10::collapsed(&tetrahedra[e]).map(|local| self.nodes[local as usize])
-            }
-            Topology::Shells { quads, .. } => twice(quads[e]).map(|local| self.nodes[local as usize]),
+        let mut corners = match &self.topology {
+            Topology::Structured { cells } => corners_of(*cells, e),
+            Topology::Explicit { hexahedra } | Topology::EightPoint { hexahedra } => hexahedra[e],
+            Topology::Tetrahedra { tetrahedra } => tet10::collapsed(&tetrahedra[e]),
+            Topology::Shells { quads, .. } => twice(quads[e]),
             Topology::Trusses { bars, .. }
             | Topology::Springs { bars, .. }
-            | Topology::Beams { bars, .. } => spread(bars[e]).map(|local| self.nodes[local as usize]),
+            | Topology::Beams { bars, .. } => spread(bars[e]),
+        };
+        // Loops here and below, because `map` is a call for each element.
+        for corner in &mut corners {
+            *corner = self.nodes[*corner as usize];
         }
+        corners
+    }
+
+    /// [`Part::corners`] with the nodes of the mesh at `x`.
+    pub fn corners_at(&self, e: usize, x: &[[f64; 3]]) -> [[f64; 3]; 8] {
+        let mut at = [[0.0; 3]; 8];
+        for (at, node) in at.iter_mut().zip(self.corners(e)) {
+            *at = x[node as usize];
+        }
+        at
     }
 
     /// Every node of element `e` of this part, as global node indices: those that carry its mass and its forces and that its
@@ -331,7 +341,7 @@ impl Part {
             Topology::Tetrahedra { tetrahedra } => {
                 tet10::volume(&tetrahedra[e].map(|local| x[self.nodes[local as usize] as usize]))
             }
-            _ => self.volume(e, &self.corners(e).map(|n| x[n as usize])),
+            _ => self.volume(e, &self.corners_at(e, x)),
         }
     }
 
@@ -347,7 +357,7 @@ impl Part {
 
     /// [`Part::volume`] of all elements, likewise.
     pub(crate) fn corner_volumes(&self, x: &[[f64; 3]]) -> Vec<f64> {
-        let corners = |e: usize| self.corners(e).map(|n| x[n as usize]);
+        let corners = |e: usize| self.corners_at(e, x);
         match &self.topology {
             Topology::Structured { .. }
             | Topology::Explicit { .. }
@@ -406,7 +416,13 @@ fn corners_of([ni, nj, _]: [u32; 3], e: usize) -> [u32; 8] {
     let row = ni + 1;
     let plane = row * (nj + 1);
     let n = i + j * row + k * plane;
-    [0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row].map(|d| (n + d) as u32)
+    let mut corners = [0; 8];
+    for (corner, d) in
+        corners.iter_mut().zip([0, 1, row + 1, row, plane, plane + 1, plane + row + 1, plane + row])
+    {
+        *corner = (n + d) as u32;
+    }
+    corners
 }
 
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {

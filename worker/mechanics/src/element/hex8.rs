@@ -39,12 +39,8 @@ use end::End;
 use stress::Stressed;
 pub(super) use view::BySlot;
 use view::View;
+pub use volumes::volume;
 pub(crate) use volumes::volumes;
-
-/// Volume of a hexahedron with these corners, as the kernel computes it, to the bit.
-pub fn volume(corners: &[[f64; 3]; 8]) -> f64 {
-    Gradient::of(&scalar_modes(corners)).volume().0
-}
 
 /// Derivative of the volume by each corner coordinate.
 pub fn volume_gradient(corners: &[[f64; 3]; 8]) -> [[f64; 3]; 8] {

@@ -183,7 +183,7 @@ pub fn stress(
         let material = &setup.materials[part.material as usize];
         let first = offsets[entry.part as usize];
         let mut lay = |e: usize| {
-            let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+            let x = part.corners_at(e, &mesh.positions);
             match &part.topology {
                 Topology::Structured { .. }
                 | Topology::Explicit { .. }

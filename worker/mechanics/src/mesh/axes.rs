@@ -66,7 +66,7 @@ impl SolidAxes {
 
     /// The first element of a part of solids that has no axes, if there is one.
     pub fn first_without(&self, part: &Part, positions: &[[f64; 3]]) -> Option<usize> {
-        (0..part.n_elements()).find(|&e| self.of(&part.corners(e).map(|n| positions[n as usize])).is_none())
+        (0..part.n_elements()).find(|&e| self.of(&part.corners_at(e, positions)).is_none())
     }
 }
 

@@ -228,7 +228,7 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
         let sound = material.sound_speed();
         for e in 0..part.n_elements() {
             if parts.binary_search(&p).is_ok() {
-                let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+                let x = part.corners_at(e, &mesh.positions);
                 let limit = least_height(part, e, &x) / sound;
                 if least.is_none_or(|(other, _)| limit < other) {
                     least = Some((limit, element));

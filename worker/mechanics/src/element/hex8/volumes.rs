@@ -1,9 +1,33 @@
-//! Volumes of many hexahedra, at the start of a run.
+//! Volumes of hexahedra, at the start of a run.
 
 use rayon::prelude::*;
 
 use super::{Gradient, Modes, modes_of};
-use crate::lanes::{Lane, SET, Width, dispatch::Task};
+use crate::lanes::{Lane, SET, Width, dispatch::Task, scalar::Scalar};
+
+/// Volume of a hexahedron with these corners, as the kernel computes it, to the bit.
+pub fn volume(corners: &[[f64; 3]; 8]) -> f64 {
+    Width::Scalar.run(Volume(corners))
+}
+
+struct Volume<'a>(&'a [[f64; 3]; 8]);
+
+impl Task for Volume<'_> {
+    type Output = f64;
+
+    /// One element has no lanes to fill.
+    #[inline(always)]
+    fn run<L: Lane>(self) -> f64 {
+        let mut x = [[Scalar(0.0); 8]; 3];
+        for (axis, x) in x.iter_mut().enumerate() {
+            for (x, corner) in x.iter_mut().zip(self.0) {
+                *x = Scalar(corner[axis]);
+            }
+        }
+        let modes = Modes::of(modes_of(x[0]), modes_of(x[1]), modes_of(x[2]));
+        Gradient::of(&modes).volume().0
+    }
+}
 
 /// Elements of a task.
 const AT_A_TIME: usize = 256;
