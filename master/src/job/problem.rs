@@ -45,20 +45,27 @@ impl Problem {
         let mut setup = model.setup.clone();
         let mut constraint = model.constraint.clone();
         initial::bind_walls(&model.mesh, &mut setup, &mut constraint).map_err(Error::Problem)?;
-        let start = initial::state(&model.mesh, &setup, &model.velocity, &constraint);
-        let mut start = start.map_err(Error::Problem)?;
-        initial::spin(&mut start, &setup.constraints, &model.spin);
-        initial::axes(&mut start, &model.mesh, &setup.materials, &model.axes).map_err(Error::Problem)?;
-        initial::scatter(&mut start, &model.mesh, &model.scatter);
-        initial::stress(&mut start, &model.mesh, &setup, &model.stress).map_err(Error::Problem)?;
-        let quanta = initial::quanta(&model.mesh, &setup, &start);
         if setup != model.setup {
             Arc::make_mut(&mut model).setup = setup;
         }
-        let touching = Touching::of(&model, &start)?;
-        let sum = sum_of(&model)?;
+        // Much of either is one thread's work.
+        let (begun, sum) = rayon::join(|| begin(&model, &constraint), || sum_of(&model));
+        let ((start, quanta, touching), sum) = (begun?, sum?);
         Ok((Self { model, quanta, touching, sum }, start))
     }
+}
+
+/// The state that a run begins at, with nodes constrained as given; the quanta of its sums and its contact.
+fn begin(model: &Model, constraint: &[u16]) -> Result<(GlobalState, Quanta, Option<Touching>), Error> {
+    let (mesh, setup) = (&model.mesh, &model.setup);
+    let mut start = initial::state(mesh, setup, &model.velocity, constraint).map_err(Error::Problem)?;
+    initial::spin(&mut start, &setup.constraints, &model.spin);
+    initial::axes(&mut start, mesh, &setup.materials, &model.axes).map_err(Error::Problem)?;
+    initial::scatter(&mut start, mesh, &model.scatter);
+    initial::stress(&mut start, mesh, setup, &model.stress).map_err(Error::Problem)?;
+    let quanta = initial::quanta(mesh, setup, &start);
+    let touching = Touching::of(model, &start)?;
+    Ok((start, quanta, touching))
 }
 
 /// The sum that binds a snapshot to its problem. A run may be gone on with to another end, with other results on the way, and with

@@ -44,19 +44,17 @@ pub fn digest(state: &GlobalState) -> String {
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
-/// Numbers that go into the hash at a time: it takes many blocks at once, and single numbers slowly.
-const AT_A_TIME: usize = 2048;
+/// Numbers that go into the hash at a time: threads share them, and single numbers take it long.
+const AT_A_TIME: usize = 1 << 17;
 
 fn update<'a>(hasher: &mut blake3::Hasher, values: impl IntoIterator<Item = &'a f64>) {
-    let mut bytes = [0; 8 * AT_A_TIME];
-    let mut filled = 0;
+    let mut bytes = Vec::new();
     for value in values {
-        bytes[filled..filled + 8].copy_from_slice(&value.to_le_bytes());
-        filled += 8;
-        if filled == bytes.len() {
-            hasher.update(&bytes);
-            filled = 0;
+        bytes.extend_from_slice(&value.to_le_bytes());
+        if bytes.len() == 8 * AT_A_TIME {
+            hasher.update_rayon(&bytes);
+            bytes.clear();
         }
     }
-    hasher.update(&bytes[..filled]);
+    hasher.update_rayon(&bytes);
 }

@@ -19,8 +19,8 @@ use crate::{
     mesh::{FACES, Mesh, Part, SolidAxes, Topology, axes::turn, laminate},
     rigid::{Body, switch::Switch},
     setup::Setup,
-    state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field, write_changed},
-    vectors::{cross, dot},
+    state::{ALIVE, GlobalState, N_FIELDS, PartHistory, ShellState, field, write_sparsely, zeros},
+    vectors::{cross, dot, minus},
     wall::{Motion, RigidWall},
 };
 
@@ -48,9 +48,9 @@ pub fn state(
         elements: std::array::from_fn(|_: usize| vec![0.0; n_elements]),
         eroded: vec![ALIVE; if setup.erosion.is_on() { n_elements } else { 0 }],
         strain: vec![0.0; if setup.erosion.counts_strain() { n_elements } else { 0 }],
-        contact: vec![vec![0.0; mesh.n_nodes()]; setup.contact.as_ref().map_or(0, Settings::n_history)],
+        contact: zeros(setup.contact.as_ref().map_or(0, Settings::n_history), mesh.n_nodes()),
         shells: ShellState::default(),
-        own: vec![vec![0.0; n_elements]; mesh.parts.iter().map(Part::n_own).max().unwrap_or(0)],
+        own: zeros(mesh.parts.iter().map(Part::n_own).max().unwrap_or(0), n_elements),
         history: Vec::new(),
     };
     if let Some(settings) = &setup.contact {
@@ -83,32 +83,34 @@ pub fn state(
             (field::ENERGY, material.initial_energy()),
             (field::PRESSURE, material.initial_pressure()),
         ] {
-            state.elements[field][of_part.clone()].iter_mut().for_each(|place| write_changed(place, value));
+            if value.to_bits() != 0 {
+                state.elements[field][of_part.clone()].par_iter_mut().for_each(|place| *place = value);
+            }
         }
         if let Topology::Trusses { cable: Some(cable), .. } = part.topology {
             for (field, value) in cable.at_start(material) {
                 state.elements[field][of_part.clone()]
                     .iter_mut()
-                    .for_each(|place| write_changed(place, value));
+                    .for_each(|place| write_sparsely(place, value));
             }
         }
-        for index in of_part {
-            if let Topology::EightPoint { .. } = part.topology {
-                for of_point in &mut state.own[points::TEMPERATURES] {
-                    of_point[index] = material.initial_temperature();
-                }
+        if let Topology::EightPoint { .. } = part.topology {
+            for of_point in &mut state.own[points::TEMPERATURES] {
+                of_point[of_part.clone()].fill(material.initial_temperature());
             }
-            if let Topology::Tetrahedra { .. } = part.topology {
-                for (array, value) in state.own.iter_mut().zip(tet10::at_start(material)) {
-                    array[index] = value;
-                }
+        }
+        if let Topology::Tetrahedra { .. } = part.topology {
+            for (array, value) in state.own.iter_mut().zip(tet10::at_start(material)) {
+                array[of_part.clone()].fill(value);
             }
-            if let Some(speed) = material.detonation_speed() {
-                let corners = part.corners(index - first).map(|n| mesh.positions[n as usize]);
+        }
+        if let Some(speed) = material.detonation_speed() {
+            let times = state.elements[field::TIME_TO_LIGHT][of_part].par_iter_mut();
+            times.enumerate().for_each(|(e, time)| {
+                let corners = part.corners_at(e, &mesh.positions);
                 let centre = std::array::from_fn(|a| corners.iter().map(|x| x[a]).sum::<f64>() * 0.125);
-                state.elements[field::TIME_TO_LIGHT][index] =
-                    lighting_time(&setup.detonations, centre, speed);
-            }
+                *time = lighting_time(&setup.detonations, centre, speed);
+            });
         }
     }
     debug_assert_eq!(state.elements.len(), N_FIELDS);
@@ -165,7 +167,7 @@ pub fn axes(
             continue;
         };
         for e in 0..part.n_elements() {
-            let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+            let x = part.corners_at(e, &mesh.positions);
             let own = axes.of(&x).ok_or_else(|| {
                 format!(
                     "element {} of part `{}` has no axes: it is flat, normal to the vector or on the line; choose other `axes`",
@@ -258,7 +260,7 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
         let material = &setup.materials[part.material as usize];
         if let Topology::Beams { section, across, .. } = &part.topology {
             for (local, across) in across.iter().enumerate() {
-                let [a, b, ..] = part.corners(local).map(|n| mesh.positions[n as usize]);
+                let [a, b, ..] = part.corners_at(local, &mesh.positions);
                 let e = first + local;
                 for (field, axis) in fields.iter_mut().zip(beam2::axis(a, b, *across)) {
                     field[e] = axis;
@@ -386,7 +388,7 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         let strength = modulus.max(material.density * top_speed2).max(pressure);
         // Force and arm of an element.
         let of_element = |e: usize| {
-            let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+            let x = part.corners_at(e, &mesh.positions);
             match &part.topology {
                 Topology::Structured { .. }
                 | Topology::Explicit { .. }
@@ -436,15 +438,13 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
 
 /// Area of the largest face of a hexahedron.
 pub(crate) fn largest_face(x: &[[f64; 3]; 8]) -> f64 {
-    FACES
-        .iter()
-        .map(|f| {
-            let [p, q, r, s] = f.map(|c| x[c]);
-            let (one, other) = (std::array::from_fn(|a| r[a] - p[a]), std::array::from_fn(|a| s[a] - q[a]));
-            let normal = cross(one, other);
-            0.5 * dot(normal, normal).sqrt()
-        })
-        .fold(0.0, f64::max)
+    let mut greatest = 0.0_f64;
+    for [p, q, r, s] in FACES {
+        let normal = cross(minus(x[r], x[p]), minus(x[s], x[q]));
+        greatest = greatest.max(dot(normal, normal));
+    }
+    // The root of the greatest square is the greatest root, rounding included.
+    0.5 * greatest.sqrt()
 }
 
 /// Gives each node of a part that feels a wall a constraint that says so, beside the walls that a deck gave it.
@@ -496,7 +496,7 @@ pub fn closing_steps(
         let speed = material.sound_speed();
         let volumes = part.corner_volumes(&mesh.positions);
         let thinnest = volumes.into_par_iter().enumerate().map(|(e, volume)| {
-            let x = part.corners(e).map(|n| mesh.positions[n as usize]);
+            let x = part.corners_at(e, &mesh.positions);
             match part.thickness_of(e) {
                 // The height above the longest side, as if it were a parallelogram.
                 Some(thickness) => volume / (thickness * longest(&[x[0], x[1], x[2], x[3]])),

@@ -3,6 +3,7 @@
 //! A piece is the state of a sub-domain: it travels, is stored, and is enough to restart that
 //! sub-domain anywhere.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -10,7 +11,7 @@ use crate::{
     erosion::criteria::PieceErosion,
     lanes::SET,
     mesh::{Form, Mesh, Part, Topology},
-    state::{GlobalState, N_FIELDS, ShellState, sparse, write_changed},
+    state::{GlobalState, N_FIELDS, ShellState, sparse, write_sparsely},
 };
 
 /// State of a sub-domain. Node arrays are by local node (structured: I fastest), element arrays by local
@@ -328,12 +329,12 @@ pub fn put_back_statics(piece: &mut Piece, state: &mut GlobalState) -> Result<()
     Ok(())
 }
 
-/// Writes what a cycle changes of a piece back into the global state. Its arrays go one by one, so that there need not be
-/// room for all of both.
+/// Writes what a cycle changes of a piece back into the global state. Each of its arrays goes as soon as it is written, so that there need
+/// not be room for all of both.
 ///
 /// # Errors
 /// If an index or a length of the piece does not fit the state; the state is then untouched.
-pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String> {
+pub fn put_back(piece: Piece, state: &mut GlobalState) -> Result<(), String> {
     let (n_nodes, n_elements) = (state.x.len(), state.initial_volume.len());
     let lengths_fit = piece.x.len() == piece.nodes.len()
         && piece.v.len() == piece.nodes.len()
@@ -379,13 +380,14 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
             held.len()
         ));
     }
-    for (from, to) in [(&mut piece.x, &mut state.x), (&mut piece.v, &mut state.v)] {
-        for (&n, value) in piece.nodes.iter().zip(std::mem::take(from)) {
+    let Piece { nodes, elements, x, v, erosion, contact, shells, mut own, mut fields, history, .. } = piece;
+    [(x, &mut state.x), (v, &mut state.v)].into_par_iter().for_each(|(from, to)| {
+        for (&n, value) in nodes.iter().zip(from) {
             to[n as usize] = value;
         }
-    }
-    if let Some(erosion) = &piece.erosion {
-        for (i, e) in piece.elements.iter().map(|&e| e as usize).enumerate() {
+    });
+    if let Some(erosion) = &erosion {
+        for (i, e) in elements.iter().map(|&e| e as usize).enumerate() {
             if let Some(eroded) = state.eroded.get_mut(e) {
                 *eroded = erosion.eroded[i];
             }
@@ -394,27 +396,28 @@ pub fn put_back(mut piece: Piece, state: &mut GlobalState) -> Result<(), String>
             }
         }
     }
-    for (values, to) in piece.contact.iter().zip(&mut state.contact) {
-        for (&n, &value) in piece.nodes.iter().zip(values) {
+    for (values, to) in contact.iter().zip(&mut state.contact) {
+        for (&n, &value) in nodes.iter().zip(values) {
             to[n as usize] = value;
         }
     }
-    for (&n, &spin) in piece.nodes.iter().zip(&piece.shells.spin) {
+    for (&n, &spin) in nodes.iter().zip(&shells.spin) {
         state.shells.spin[n as usize] = spin;
     }
     if let Some(place) = place {
-        for (column, values) in state.history[place].columns.iter_mut().zip(&piece.history) {
-            for (&e, &value) in piece.elements.iter().zip(values) {
+        for (column, values) in state.history[place].columns.iter_mut().zip(&history) {
+            for (&e, &value) in elements.iter().zip(values) {
                 column[(e - first) as usize] = value;
             }
         }
     }
-    let own = piece.own.iter_mut().zip(&mut state.own);
-    for (values, to) in piece.fields.iter_mut().zip(&mut state.elements).chain(own) {
-        for (&e, value) in piece.elements.iter().zip(std::mem::take(values)) {
-            write_changed(&mut to[e as usize], value);
+    let own = own.iter_mut().zip(&mut state.own);
+    let arrays: Vec<_> = fields.iter_mut().zip(&mut state.elements).chain(own).collect();
+    arrays.into_par_iter().for_each(|(values, to)| {
+        for (&e, value) in elements.iter().zip(std::mem::take(values)) {
+            write_sparsely(&mut to[e as usize], value);
         }
-    }
+    });
     Ok(())
 }
 

@@ -64,15 +64,23 @@ pub mod field {
 pub(crate) fn sparse(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64> {
     let mut array = vec![0.0; values.len()];
     for (place, value) in array.iter_mut().zip(values) {
-        write_changed(place, value);
+        if value.to_bits() != 0 {
+            *place = value;
+        }
     }
     array
 }
 
-/// Writes a value where another stands: reading alone does not give memory to a page of zeros.
+/// So many arrays of `n` zeros. None is a copy of another, which would take memory.
+pub(crate) fn zeros(n_arrays: usize, n: usize) -> Vec<Vec<f64>> {
+    (0..n_arrays).map(|_| vec![0.0; n]).collect()
+}
+
+/// Writes a value, but no zero where zero stands: reading alone does not give memory to a page of zeros. Other values are written without
+/// reading, since a page that is read first is mapped twice.
 #[inline(always)]
-pub(crate) fn write_changed(place: &mut f64, value: f64) {
-    if place.to_bits() != value.to_bits() {
+pub(crate) fn write_sparsely(place: &mut f64, value: f64) {
+    if value.to_bits() != 0 || place.to_bits() != 0 {
         *place = value;
     }
 }
@@ -205,13 +213,30 @@ impl GlobalState {
             elements: std::array::from_fn(|_| vec![0.0; n_elements]),
             eroded: vec![ALIVE; self.eroded.len()],
             strain: vec![0.0; self.strain.len()],
-            contact: vec![vec![0.0; n_nodes]; self.contact.len()],
+            contact: zeros(self.contact.len(), n_nodes),
             shells: ShellState {
                 spin: vec![[0.0; 3]; self.shells.inertia.len()],
                 inertia: self.shells.inertia.clone(),
             },
-            own: vec![vec![0.0; n_elements]; self.own.len()],
+            own: zeros(self.own.len(), n_elements),
             ..if self.is_outline() { self.outline() } else { self.statics() }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_is_kept_to_the_bit_by_arrays_that_spare_zeros() {
+        let numbers = [0.0, -0.0, 1.5, f64::MIN_POSITIVE / 2.0, 0.0, f64::NAN];
+        let bits = |array: &[f64]| array.iter().map(|number| number.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&sparse(numbers.into_iter())), bits(&numbers));
+        for before in [0.0, -0.0, 7.0] {
+            let mut array = [before; 6];
+            array.iter_mut().zip(numbers).for_each(|(place, number)| write_sparsely(place, number));
+            assert_eq!(bits(&array), bits(&numbers), "where {before:?} stood");
         }
     }
 }

@@ -24,7 +24,7 @@ use crate::{
     state::{
         N_FIELDS,
         field::{DAMAGE, ENERGY, PRESSURE, SXX, SXY, SYY, SYZ, SZX, VISCOSITY},
-        sparse, write_changed,
+        sparse,
     },
 };
 
@@ -105,7 +105,10 @@ impl Solids {
         let by_slot = |values: Vec<f64>, phantom: f64| {
             let mut array = vec![phantom; n_slots];
             for (slot, value) in slots.iter().zip(values) {
-                write_changed(&mut array[slot], value);
+                // Pages of phantoms alone are left as they are.
+                if value.to_bits() != phantom.to_bits() {
+                    array[slot] = value;
+                }
             }
             array
         };

@@ -12,6 +12,7 @@ use crate::{
     material::Material,
     mesh::{Section, laminate::direction, quad_area},
     spin::Turning,
+    state::zeros,
 };
 
 /// Shells of one material and thickness with nodes of their own, for whoever drives them without a cycle. Node arrays are
@@ -66,13 +67,13 @@ impl Shells {
         let (n_nodes, n_elements) = (x.len(), corners.len());
         let n_padded = n_nodes.next_multiple_of(SET);
         let mut inertia = vec![0.0; n_nodes];
-        let mut fields = vec![vec![0.0; n_elements]; section.n_fields()];
+        let mut fields = zeros(section.n_fields(), n_elements);
         fields[kernel::THICKNESS].fill(thickness);
         for layer in fields[kernel::ELEMENT..].chunks_mut(LAYER) {
             layer[TEMPERATURE].fill(material.initial_temperature());
         }
         if let Some(laminate) = &section.laminate {
-            fields.resize(ply_field(section.n_layers()), vec![0.0; n_elements]);
+            fields.resize_with(ply_field(section.n_layers()), || vec![0.0; n_elements]);
             for (e, corners) in corners.iter().enumerate() {
                 let x = corners.map(|n| x[n as usize]);
                 let direction =
