@@ -25,6 +25,9 @@ use crate::{
     stopwatch::Lap,
 };
 
+/// Elements of a worker from which on the memory of what was sent of them is looked after.
+const MANY: usize = 1 << 17;
+
 /// Counts thread-CPU time of compute threads (ns).
 #[derive(Debug, Default)]
 pub struct ThreadClock {
@@ -268,6 +271,10 @@ impl Machine {
             &assign.gauges,
             width,
         );
+        if domain.n_elements() >= MANY {
+            // Their pieces went as blocks were made of them.
+            system::allocator::return_free_pages();
+        }
         domain.place_bodies(&assign.bodies)?;
         domain.watch(&assign.watched);
         domain.install(&assign.plan, &assign.ghost_state, &self.clock)?;
