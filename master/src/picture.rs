@@ -16,6 +16,7 @@ use std::{
 
 use deck::bundle::Options;
 use mechanics::initial;
+use rayon::prelude::*;
 
 use crate::{
     deck_file::read_deck_with,
@@ -332,7 +333,8 @@ pub fn of_report(folder: &Path, summary: &Summary) -> Vec<Picture> {
         encode(&mut png, &image).ok()?;
         Some(Picture { caption, png })
     };
-    ends.into_iter().filter_map(draw).collect()
+    // Nothing else is left to do when a run has ended.
+    ends.into_par_iter().filter_map(draw).collect()
 }
 
 /// Writes a PNG file.

@@ -21,7 +21,7 @@ impl Job {
         worker_state: Collected,
         actions: &mut Vec<Action>,
     ) -> Result<(), Error> {
-        let Collected { state, vote, due } = worker_state;
+        let Collected { mut state, vote, due } = worker_state;
         let cycle = state.cycle;
         if let Some(vote) = vote {
             let stopped = Stopped { state, vote, due };
@@ -31,12 +31,14 @@ impl Job {
             self.epoch.samples.hold(stopped);
             return self.prove_stop(cycle, actions);
         }
+        let is_checkpoint = self.checkpoints.is_expected(cycle);
         if due {
             self.twice.note_state(&state);
             self.note_fragments(&state);
-            actions.push(Action::State(Box::new(state.clone())));
+            let given = if is_checkpoint { state.clone() } else { std::mem::take(&mut state) };
+            actions.push(Action::State(Box::new(given)));
         }
-        if self.checkpoints.is_expected(cycle) {
+        if is_checkpoint {
             self.checkpoints.take_state(cycle, state);
             return self.complete_checkpoint(cycle, actions);
         }

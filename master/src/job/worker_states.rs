@@ -43,7 +43,7 @@ impl WorkerStates {
         self.ordered.insert(cycle, (time, due));
     }
 
-    /// Adds the state of one of `n` workers; gives the whole state once all are here. What states do not hold is taken from
+    /// Adds the state of one of `n` workers; gives the whole state once all are here. What no cycle changes is taken from
     /// `before`, the state that work was dealt out from.
     ///
     /// # Errors
@@ -69,7 +69,7 @@ impl WorkerStates {
             return Ok(None);
         }
         let Some(collected) = self.collecting.remove(&cycle) else { return Ok(None) };
-        let mut state = if before.is_static() { before.to_fill() } else { before.clone() };
+        let mut state = before.to_fill();
         for mut piece in collected.pieces {
             if before.is_outline() {
                 piece::put_back_statics(&mut piece, &mut state).map_err(Error::Problem)?;

@@ -17,7 +17,7 @@ use crate::erosion::surface_of;
 
 use super::{
     CONTACT_PVD, Error, Folder, contact_name,
-    vtu::{Array, write_index, write_piece},
+    vtu::{Array, Constants, write_index, write_piece},
     write_whole,
 };
 
@@ -94,7 +94,8 @@ impl Probe {
         );
         let moment = (state.time, state.cycle);
         write_whole(&folder.file(&contact_name(index)), |out| {
-            write_piece(out, model, "PolyData", &sizes, moment, &sections)
+            let constants = &mut Constants::default();
+            write_piece(out, model, ("PolyData", &sizes), moment, &sections, constants)
         })
     }
 

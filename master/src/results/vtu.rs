@@ -26,6 +26,7 @@ use super::{
     write_whole,
 };
 use appended::Appended;
+pub(super) use appended::Constants;
 pub(super) use array::Array;
 pub use fields::Fields;
 
@@ -136,7 +137,8 @@ pub fn write_vtu(
     fields: &Fields,
     worker: Option<&[u32]>,
 ) -> Result<(), Error> {
-    write_whole(path, |out| stream(out, model, state, fields, worker))
+    let mut constants = Constants::default();
+    write_whole(path, |out| stream_with(out, model, state, fields, worker, &mut constants))
 }
 
 /// The file of [`write_vtu`] as bytes into any writer.
@@ -152,6 +154,18 @@ pub fn stream(
     state: &GlobalState,
     fields: &Fields,
     worker: Option<&[u32]>,
+) -> io::Result<()> {
+    stream_with(out, model, state, fields, worker, &mut Constants::default())
+}
+
+/// [`stream`] of one of several states of a model, with what they have in common.
+fn stream_with(
+    out: &mut impl Write,
+    model: &Model,
+    state: &GlobalState,
+    fields: &Fields,
+    worker: Option<&[u32]>,
+    constants: &mut Constants,
 ) -> io::Result<()> {
     let (n_nodes, n_elements) = (model.mesh.n_nodes(), model.mesh.n_elements());
     assert_eq!(state.x.len(), n_nodes, "positions of the state and nodes of the mesh");
@@ -176,8 +190,9 @@ pub fn stream(
     // Eroded elements are left out, their nodes are not.
     let kept: Vec<usize> = (0..n_elements).filter(|&e| !state.is_eroded(e)).collect();
     let n_cells = kept.len();
+    let are_all_kept = n_cells == n_elements;
     let cell: Vec<Array> =
-        if n_cells < n_elements { cell.into_iter().map(|array| array.only(&kept)).collect() } else { cell };
+        if are_all_kept { cell } else { cell.into_iter().map(|array| array.only(&kept)).collect() };
     let points = [Array::f64("Points", n_nodes, |n| state.x[n])];
     // Where not every element has eight nodes the lists are made first.
     let mixed = !elements.are_hexahedra();
@@ -205,24 +220,26 @@ pub fn stream(
             components: 1,
             tuples: n_cells,
             grouped: true,
+            constant: false,
             put: Box::new(|cell, out| out.push(types.get(cell).copied().unwrap_or(VTK_HEXAHEDRON))),
         },
     ];
+    let cells = if are_all_kept { cells.map(Array::constant) } else { cells };
     let sections: [(&str, &[Array]); 4] =
         [("PointData", &point), ("CellData", &cell), ("Points", &points), ("Cells", &cells)];
     let sizes = format!(r#"NumberOfPoints="{n_nodes}" NumberOfCells="{n_cells}""#);
     let moment = (state.time, state.cycle);
-    write_piece(out, model, "UnstructuredGrid", &sizes, moment, &sections)
+    write_piece(out, model, ("UnstructuredGrid", &sizes), moment, &sections, constants)
 }
 
 /// A VTK file of one piece: `grid` is the kind of its data, `sizes` the attributes of the piece, `moment` time and cycle.
 pub(super) fn write_piece(
     out: &mut impl Write,
     model: &Model,
-    grid: &str,
-    sizes: &str,
+    (grid, sizes): (&str, &str),
     moment: (f64, u64),
     sections: &[(&str, &[Array])],
+    constants: &mut Constants,
 ) -> io::Result<()> {
     let compress = model.output.compress;
     let compressor = if compress { r#" compressor="vtkZLibDataCompressor""# } else { "" };
@@ -236,7 +253,7 @@ pub(super) fn write_piece(
     writeln!(out, "    <Piece {sizes}>")?;
     // Where an array begins is said before it comes, so what is compressed is compressed first.
     let arrays = || sections.iter().flat_map(|(_, arrays)| *arrays);
-    let data: Vec<Appended> = arrays().map(|array| Appended::of(array, compress)).collect();
+    let data: Vec<Appended> = arrays().map(|array| Appended::of(array, compress, constants)).collect();
     let mut sized = data.iter();
     let mut offset = 0;
     for (section, arrays) in sections {
@@ -289,13 +306,13 @@ fn data_arrays<'a>(
             let (x, start) = (state.x[n], mesh.positions[n]);
             std::array::from_fn::<f64, 3, _>(|axis| x[axis] - start[axis])
         }),
-        Array::u32("node_id", n_nodes, move |n| mesh.node_ids[n]),
+        Array::u32("node_id", n_nodes, move |n| mesh.node_ids[n]).constant(),
         Array::f64("mass", n_nodes, move |n| [state.mass[n]]),
     ];
     let mut cell = vec![
-        Array::u32("part", n_elements, move |e| elements.locate(e).0 as u32),
-        Array::u32("material", n_elements, move |e| elements.material(e)),
-        Array::u32("element_id", n_elements, move |e| elements.element_id(e)),
+        Array::u32("part", n_elements, move |e| elements.locate(e).0 as u32).constant(),
+        Array::u32("material", n_elements, move |e| elements.material(e)).constant(),
+        Array::u32("element_id", n_elements, move |e| elements.element_id(e)).constant(),
         Array::f64("pressure", n_elements, move |e| [pressure(e)]),
         Array::f64("von_mises", n_elements, move |e| [von_mises(deviator(e))]),
         Array::f64("plastic_strain", n_elements, move |e| [plastic_strain(e)]),
@@ -349,7 +366,7 @@ fn data_arrays<'a>(
             let (part, local) = elements.locate(e);
             let part = &mesh.parts[part];
             let Topology::Beams { .. } = part.topology else { return None };
-            let [a, b, ..] = part.corners(local).map(|n| state.x[n as usize]);
+            let [a, b, ..] = part.corners_at(local, &state.x);
             let length = (0..3).map(|i| (b[i] - a[i]) * (b[i] - a[i])).sum::<f64>().sqrt();
             Some((length, [0, 1, 2, 3, 4, 5].map(|i| state.own[beam2::AXIAL + i][e])))
         };
@@ -394,6 +411,8 @@ pub struct Series {
     probe: Option<Probe>,
     /// Time of each state written.
     times: Vec<f64>,
+    /// What the states have in common.
+    constants: Constants,
 }
 
 impl Series {
@@ -407,6 +426,7 @@ impl Series {
             fields: Fields::of(&model.output)?,
             probe: None,
             times: Vec::new(),
+            constants: Constants::default(),
         })
     }
 
@@ -427,7 +447,9 @@ impl Series {
         if let Some(probe) = &self.probe {
             probe.write(&self.folder, index, model, state)?;
         }
-        write_vtu(&self.folder.file(&state_name(index)), model, state, &self.fields, worker)?;
+        let Self { folder, fields, constants, .. } = self;
+        let file = folder.file(&state_name(index));
+        write_whole(&file, |out| stream_with(out, model, state, fields, worker, constants))?;
         self.times.push(state.time);
         let indexed = self.write_index();
         if indexed.is_err() {

@@ -3,11 +3,12 @@
 //! Raw: the number of bytes (64 bits), then the bytes. Compressed, as `vtkZLibDataCompressor` has it: the number of
 //! blocks, the size of a whole block, that of the last one if it is not whole (else zero), the compressed size of each
 //! block, all of 64 bits, then the blocks, each a zlib stream by itself. Equal numbers give equal bytes on every
-//! machine: the compressor is pinned and has one code path.
+//! machine: the compressor is pinned and has one code path. Blocks of numbers without a pattern, such as velocities behind a shock, are
+//! stored as they are: compression takes most of the time of a state and would gain a tenth of them.
 
 #![cfg_attr(test, expect(clippy::disallowed_methods, reason = "tests write waves"))]
 
-use std::{io, io::Write};
+use std::{collections::BTreeMap, io, io::Write, sync::Arc};
 
 use miniz_oxide::{deflate::compress_to_vec_zlib, inflate::decompress_to_vec_zlib_with_limit};
 
@@ -18,6 +19,13 @@ const BLOCK: usize = 1 << 18;
 
 /// Level of compression. On states of impacts a higher one takes three times the time for a few per cent.
 const LEVEL: u8 = 1;
+
+/// Bytes at the start of a block by which it is judged, and the share of them that must be left at most for compression to be worth it.
+const SAMPLE: usize = 1 << 13;
+const WORTH: f64 = 0.8;
+
+/// Level of blocks that are stored.
+const STORED: u8 = 0;
 
 /// Bytes of raw numbers that are held at once.
 const CHUNK: usize = 1 << 16;
@@ -30,13 +38,27 @@ pub(super) enum Appended {
     /// So many bytes of numbers, which come as they are written.
     Raw(u64),
     /// Header and blocks.
-    Compressed(Vec<u8>),
+    Compressed(Arc<[u8]>),
+}
+
+/// Arrays that all states of a run have in common, compressed once, by name.
+#[derive(Default)]
+pub struct Constants(BTreeMap<String, Arc<[u8]>>);
+
+impl Constants {
+    fn encoded(&mut self, array: &Array) -> Arc<[u8]> {
+        if !array.constant {
+            return encode(array).into();
+        }
+        let known = self.0.entry(array.name.to_owned()).or_insert_with(|| encode(array).into());
+        Arc::clone(known)
+    }
 }
 
 impl Appended {
-    /// Compresses the numbers of an array, or only measures them.
-    pub(super) fn of(array: &Array, compress: bool) -> Self {
-        if compress { Self::Compressed(encode(array)) } else { Self::Raw(array.n_bytes()) }
+    /// Compresses the numbers of an array unless they are among `constants`, or only measures them.
+    pub(super) fn of(array: &Array, compress: bool, constants: &mut Constants) -> Self {
+        if compress { Self::Compressed(constants.encoded(array)) } else { Self::Raw(array.n_bytes()) }
     }
 
     /// Bytes in the file, the header included.
@@ -72,13 +94,20 @@ fn chunks(array: &Array, size: usize, mut take: impl FnMut(&[u8]) -> io::Result<
     if buffer.is_empty() { Ok(()) } else { take(&buffer) }
 }
 
+/// At which level a block is compressed.
+fn level_of(block: &[u8]) -> u8 {
+    let Some(sample) = block.get(..SAMPLE) else { return LEVEL };
+    let left = compress_to_vec_zlib(sample, LEVEL).len();
+    if left as f64 > WORTH * SAMPLE as f64 { STORED } else { LEVEL }
+}
+
 /// Header and blocks of an array.
 fn encode(array: &Array) -> Vec<u8> {
     let size = array.n_bytes();
     let mut sizes: Vec<u64> = vec![size.div_ceil(BLOCK as u64), BLOCK as u64, size % BLOCK as u64];
     let mut blocks = Vec::new();
     let compressed = chunks(array, BLOCK, |numbers| {
-        let block = compress_to_vec_zlib(numbers, LEVEL);
+        let block = compress_to_vec_zlib(numbers, level_of(numbers));
         sizes.push(block.len() as u64);
         blocks.extend_from_slice(&block);
         Ok(())
@@ -154,7 +183,7 @@ mod tests {
         for n in [0, 1, 1000, 2 * BLOCK / 8, 50_000] {
             for compress in [false, true] {
                 let mut bytes = Vec::new();
-                let appended = Appended::of(&array(n), compress);
+                let appended = Appended::of(&array(n), compress, &mut Constants::default());
                 let size = appended.n_bytes();
                 appended.write(&array(n), &mut bytes).expect("into memory");
                 assert_eq!(bytes.len() as u64, size);
@@ -162,6 +191,38 @@ mod tests {
                 assert_eq!(decode(&bytes, compress, 24 * n), Ok(raw(n)), "{n} tuples, {compress}");
             }
         }
+    }
+
+    #[test]
+    fn numbers_without_a_pattern_are_stored_and_come_back() {
+        let mut state = 0x2545_f491_4f6c_dd1d_u64;
+        let noise: Vec<f64> = (0..2 * BLOCK / 8)
+            .map(|_| {
+                state ^= state << 13;
+                state ^= state >> 7;
+                state ^= state << 17;
+                f64::from_bits(state)
+            })
+            .collect();
+        // The first block is noise, the second does not begin with it.
+        let of = |i: usize| if (BLOCK / 8..=BLOCK / 8 + SAMPLE).contains(&i) { 1.0 } else { noise[i] };
+        let bytes = encode(&Array::f64("noise", noise.len(), |i| [of(i)]));
+        let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight")) as usize;
+        assert!((BLOCK..BLOCK + 64).contains(&word(24)), "{} bytes stored", word(24));
+        assert!(word(32) < BLOCK, "{} bytes compressed", word(32));
+        let raw: Vec<u8> = (0..noise.len()).flat_map(|i| of(i).to_le_bytes()).collect();
+        assert!(decode(&bytes, true, raw.len()) == Ok(raw));
+    }
+
+    #[test]
+    fn constants_are_compressed_once_and_others_each_time() {
+        let mut constants = Constants::default();
+        let mut encoded = |array: Array| constants.encoded(&array).to_vec();
+        let first = encoded(array(1000).constant());
+        assert_eq!(encoded(array(1000)), first);
+        assert_ne!(encoded(array(999)), first, "nobody said that it is constant");
+        let other = Array::f64("wave", 1000, |_| [0.5]);
+        assert_eq!(encoded(other.constant()), first, "it is known by its name");
     }
 
     #[test]

@@ -17,6 +17,8 @@ pub(in crate::results) struct Array<'a> {
     pub(super) tuples: usize,
     /// Whether the components are told to the reader; otherwise the array is one long list.
     pub(super) grouped: bool,
+    /// Whether it is the same in all states of a run.
+    pub(super) constant: bool,
     pub(super) put: Put<'a>,
 }
 
@@ -28,7 +30,7 @@ impl<'a> Array<'a> {
     ) -> Self {
         let put: Put =
             Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
-        Self { name, kind: "Float64", width: 8, components: N, tuples, grouped: true, put }
+        Self { name, kind: "Float64", width: 8, components: N, tuples, grouped: true, constant: false, put }
     }
 
     /// A list of indices, `N` per tuple; VTK refuses grouped ones.
@@ -39,18 +41,23 @@ impl<'a> Array<'a> {
     ) -> Self {
         let put: Put =
             Box::new(move |i, out| of(i).iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes())));
-        Self { name, kind: "Int64", width: 8, components: N, tuples, grouped: false, put }
+        Self { name, kind: "Int64", width: 8, components: N, tuples, grouped: false, constant: false, put }
     }
 
     pub(in crate::results) fn u32(name: &'a str, tuples: usize, of: impl Fn(usize) -> u32 + 'a) -> Self {
         let put: Put = Box::new(move |i, out| out.extend_from_slice(&of(i).to_le_bytes()));
-        Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, put }
+        Self { name, kind: "UInt32", width: 4, components: 1, tuples, grouped: true, constant: false, put }
     }
 
-    /// The tuples of some elements alone.
+    /// An array that is the same in all states of a run.
+    pub(super) fn constant(self) -> Self {
+        Self { constant: true, ..self }
+    }
+
+    /// The tuples of some elements alone, which are others in each state.
     pub(super) fn only(self, kept: &'a [usize]) -> Self {
         let put = self.put;
-        Self { tuples: kept.len(), put: Box::new(move |i, out| put(kept[i], out)), ..self }
+        Self { tuples: kept.len(), put: Box::new(move |i, out| put(kept[i], out)), constant: false, ..self }
     }
 
     /// Size of the numbers, without the header that precedes them.
