@@ -1,13 +1,15 @@
 //! Decomposition: which worker holds which part of the Lagrange grids, in proportion to speeds.
 //!
 //! Every part is cut among all workers, with the same grouping of workers for all parts, so that facing columns of
-//! neighbouring parts fall on one worker. Structured parts are cut along index planes (paper section 3), explicit
+//! neighbouring parts fall on one worker. Structured parts are cut along index planes ([`grids`], paper section 3), explicit
 //! ones by recursive coordinate bisection. Columns and slabs that are cut along two axes or one share nodes with fewer others than blocks
 //! do, which pays where messages cost more than nodes and wires are fast. The best of several groupings and sets of axes wins, by the
-//! slowest finish of elements, nodes ([`work`]) and messages. Elements that have eroded cost nothing ([`Living`]); they are dealt out
-//! all the same, since their state is still held.
+//! slowest finish of elements, nodes and the exchange of partial forces ([`exchange`]). Elements that have eroded cost nothing
+//! ([`Living`]); they are dealt out all the same, since their state is still held.
 
-use std::collections::BTreeSet;
+mod exchange;
+mod grids;
+mod seams;
 
 use mechanics::{
     mesh::{Mesh, Topology},
@@ -15,6 +17,9 @@ use mechanics::{
 };
 
 use crate::balance::Costs;
+use exchange::{Exchange, Held};
+use grids::{AXES, Cells, cut_planes};
+use seams::Seams;
 
 /// A sub-domain: a region of a part on a worker.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,48 +32,121 @@ pub struct Subdomain {
     pub worker: usize,
 }
 
-/// How many orders of the workers are tried; the best by the bound wins.
-const GROUPINGS: u64 = 25;
+/// How many orders of the workers are tried at most; the best by the estimate wins.
+const GROUPINGS: usize = 25;
 
-/// How often a grouping is cut again, each time for shares corrected by what came of the last.
-const CORRECTIONS: usize = 4;
+/// The first so many orders are divided by speed too.
+const BY_SPEED: usize = 6;
+
+/// How often a grouping is cut again at most for shares corrected by the work of the last cut, and then by the ends of the estimate.
+const BY_WORK: usize = 3;
+const BY_ENDS: usize = 8;
+
+/// Of many workers fewer orders and corrections are tried: so many workers in all.
+const TRIED: usize = 2000;
+
+/// A cut that ends so many times later than the best is not corrected where wires are what workers wait for.
+const NEAR: f64 = 1.15;
+
+/// A set of axes that ended so many times later than the best is not tried with further groupings.
+const FAR: f64 = 1.5;
+
+/// Workers wait for wires if they end so many times later than their work alone takes. A correction by the ends has to gain as much, as the
+/// estimate knows a wire less well than work.
+const WAITS: f64 = 1.03;
+
+/// Where the workers of an order are divided, again and again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Halves {
+    /// In the middle.
+    Count,
+    /// Where both sides are as fast.
+    Speed,
+}
+
+impl Halves {
+    /// How many workers are on the first side: two choices, which may be one.
+    fn of(self, workers: &[usize], speeds: &[f64]) -> [usize; 2] {
+        match self {
+            Self::Count => [workers.len() / 2, workers.len() - workers.len() / 2],
+            Self::Speed => {
+                let all = total(workers, speeds);
+                let uneven = |split: usize| (2.0 * total(&workers[..split], speeds) - all).abs();
+                let nearest = |a: usize, b: usize| if uneven(b) < uneven(a) { b } else { a };
+                [(1..workers.len()).reduce(nearest).unwrap_or(1); 2]
+            }
+        }
+    }
+}
 
 /// Cuts the mesh for workers of these relative speeds. Sub-domains come part by part, shells first; those without elements are left
 /// out, so a worker may have none in a small problem. `alive` says by global index which elements cost anything; all do
-/// where it is none.
-pub fn decompose(mesh: &Mesh, speeds: &[f64], costs: Costs, alive: Option<&[bool]>) -> Vec<Subdomain> {
+/// where it is none. Structured parts that face each other exchange forces of contact if they `touch`.
+pub fn decompose(
+    mesh: &Mesh,
+    speeds: &[f64],
+    costs: Costs,
+    (alive, touch): (Option<&[bool]>, bool),
+) -> Vec<Subdomain> {
+    let n = speeds.len();
     let living = Living::new(mesh, alive);
     let mut best: Option<(f64, Vec<Subdomain>)> = None;
     let equal = speeds.iter().all(|s| *s == speeds[0]);
     let is_structured = |part: &mechanics::mesh::Part| matches!(part.topology, Topology::Structured { .. });
-    let choices = if costs.message > 0.0 && mesh.parts.iter().any(is_structured) { AXES } else { &AXES[..1] };
-    for seed in 0..if speeds.len() < 3 || equal { 1 } else { GROUPINGS } {
-        let order = grouping(speeds, seed);
-        for axes in choices {
+    let has_choice = n > 1 && costs.message > 0.0 && mesh.parts.iter().any(is_structured);
+    let choices = if has_choice { AXES } else { &AXES[..1] };
+    let seams = if has_choice { Seams::new(mesh, touch) } else { Seams::default() };
+    let (groupings, by_work) = if n < 3 || equal { (1, 0) } else { (GROUPINGS.min(2 + TRIED / n), BY_WORK) };
+    // Contact is dealt out by work, so those that got fewer elements would get it, and with it more ghosts.
+    let by_ends = if has_choice && !touch { BY_ENDS.min(TRIED / n) } else { 0 };
+    // What each set of axes came to at the best.
+    let mut ended = vec![f64::INFINITY; choices.len()];
+    let by_count = (0..groupings).map(|seed| (seed, Halves::Count));
+    let by_speed = (0..groupings.min(BY_SPEED)).filter(|_| !equal).map(|seed| (seed, Halves::Speed));
+    for (seed, halves) in by_count.chain(by_speed) {
+        let order = grouping(speeds, seed as u64);
+        for (axes, ended) in choices.iter().zip(&mut ended) {
+            let least = best.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
+            if ended.is_finite() && *ended > FAR * least {
+                continue;
+            }
             let mut shares = speeds.to_vec();
-            for _ in 0..if equal { 1 } else { CORRECTIONS } {
-                let subdomains = cut_all(mesh, &shares, (&order, axes), &living);
-                let work = work(&subdomains, speeds.len(), costs.node, &living);
-                let finish = slowest(&work, speeds);
-                let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
-                // Ragged pieces have more nodes: their workers get fewer elements in the next try.
-                for ((share, work), speed) in shares.iter_mut().zip(&work).zip(speeds) {
-                    *share *= if *work > 0.0 { mean * speed / work } else { 1.0 };
-                }
+            for correction in 0..=by_work + by_ends {
+                let subdomains = cut_all(mesh, &shares, (&order, halves, axes), &living);
+                let held = held_by(&subdomains, n, &living);
+                let work: Vec<f64> = held.iter().map(|held| held.work(costs.node)).collect();
+                let computed: Vec<f64> = work.iter().zip(speeds).map(|(work, speed)| work / speed).collect();
+                let least = best.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
                 // An equal finish keeps the earlier grouping, and the first is the order the user gave.
-                let is_better =
-                    |finish: f64| best.as_ref().is_none_or(|(least, _)| finish < *least * (1.0 - 1e-9));
-                if !is_better(finish) {
-                    continue;
-                }
-                let finish = if costs.message > 0.0 {
-                    let shared = Shared::new(&subdomains, speeds.len());
-                    shared.slowest(&shared.add_messages(work, costs.message), speeds, costs.byte)
+                let gain = if correction > by_work { WAITS } else { 1.0 + 1e-9 };
+                let is_better = |ends: &[f64]| last(ends) * gain < least;
+                let ends = if costs.message > 0.0 && is_better(&computed) {
+                    Exchange::new(mesh, &subdomains, n, &seams).ends(&held, speeds, costs)
                 } else {
-                    finish
+                    computed.clone()
                 };
-                if is_better(finish) {
-                    best = Some((finish, subdomains));
+                *ended = ended.min(last(&ends));
+                let waits = last(&ends) > WAITS * last(&computed);
+                let far = waits && last(&ends) > NEAR * least;
+                if is_better(&ends) {
+                    best = Some((last(&ends), subdomains));
+                }
+                if far || correction >= by_work && !waits {
+                    break;
+                }
+                if correction < by_work {
+                    // Ragged pieces have more nodes: their workers get fewer elements in the next try.
+                    let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
+                    for (share, computed) in shares.iter_mut().zip(&computed) {
+                        *share *= if *computed > 0.0 { mean / computed } else { 1.0 };
+                    }
+                } else {
+                    // Those that end late because of wires get fewer too.
+                    let mean = ends.iter().sum::<f64>() / n as f64;
+                    shares
+                        .iter_mut()
+                        .zip(&ends)
+                        .for_each(|(share, end)| *share *= mean / end.max(0.1 * mean));
                 }
             }
         }
@@ -77,72 +155,18 @@ pub fn decompose(mesh: &Mesh, speeds: &[f64], costs: Costs, alive: Option<&[bool
 }
 
 /// What each worker's sub-domains cost in a cycle (element-cycles): living elements, nodes, and messages to those that share nodes.
-pub fn held(subdomains: &[Subdomain], n: usize, costs: Costs, living: &Living) -> Vec<f64> {
+pub fn held(mesh: &Mesh, subdomains: &[Subdomain], n: usize, costs: Costs, living: &Living) -> Vec<f64> {
     let work = work(subdomains, n, costs.node, living);
-    if costs.message > 0.0 { Shared::new(subdomains, n).add_messages(work, costs.message) } else { work }
-}
-
-/// The last finish.
-fn slowest(work: &[f64], speeds: &[f64]) -> f64 {
-    work.iter().zip(speeds).map(|(w, s)| w / s).fold(0.0, f64::max)
-}
-
-/// How much longer than its bytes an exchange takes: frames of several neighbours follow each other, and both sides wait for the last.
-const WIRE: f64 = 2.0;
-
-/// What workers share in structured parts.
-struct Shared {
-    /// By worker: others with which it shares nodes.
-    neighbours: Vec<u32>,
-    /// By worker: copies of its nodes that others hold.
-    nodes: Vec<f64>,
-}
-
-impl Shared {
-    fn new(subdomains: &[Subdomain], n: usize) -> Self {
-        let boxes: Vec<(usize, Cells, usize)> = subdomains
-            .iter()
-            .filter_map(|s| match s.region {
-                Region::Cells { low, high } => Some((s.part, Cells { low, high }, s.worker)),
-                Region::List(_) => None,
-            })
-            .collect();
-        let mut shared = Self { neighbours: vec![0; n], nodes: vec![0.0; n] };
-        let mut pairs = BTreeSet::new();
-        for (at, (part, cells, worker)) in boxes.iter().enumerate() {
-            for (other_part, other_cells, other) in &boxes[at + 1..] {
-                let nodes = cells.nodes_shared_with(other_cells);
-                if part == other_part && worker != other && nodes > 0.0 {
-                    pairs.insert((*worker.min(other), *worker.max(other)));
-                    shared.nodes[*worker] += nodes;
-                    shared.nodes[*other] += nodes;
-                }
-            }
-        }
-        for (one, other) in pairs {
-            shared.neighbours[one] += 1;
-            shared.neighbours[other] += 1;
-        }
-        shared
-    }
-
-    /// Adds what messages cost: two for each neighbour.
-    fn add_messages(&self, mut work: Vec<f64>, message: f64) -> Vec<f64> {
-        for (work, &neighbours) in work.iter_mut().zip(&self.neighbours) {
-            *work += 2.0 * message * f64::from(neighbours);
-        }
+    if costs.message > 0.0 {
+        Exchange::new(mesh, subdomains, n, &Seams::default()).add_messages(work, costs.message)
+    } else {
         work
     }
+}
 
-    /// The last finish, with partial forces of three numbers by node on a wire in each direction: they travel while elements are computed
-    /// that touch no other worker's, of which there are fewer by about the shared nodes.
-    fn slowest(&self, work: &[f64], speeds: &[f64], byte: f64) -> f64 {
-        let finish = |((work, speed), nodes): ((&f64, &f64), &f64)| {
-            let beside = (work - nodes).max(0.0) / speed;
-            work / speed + (WIRE * 24.0 * byte * nodes - beside).max(0.0)
-        };
-        work.iter().zip(speeds).zip(&self.nodes).map(finish).fold(0.0, f64::max)
-    }
+/// The last of some ends.
+fn last(ends: &[f64]) -> f64 {
+    ends.iter().copied().fold(0.0, f64::max)
 }
 
 /// The worker of every element, by global index.
@@ -171,15 +195,21 @@ pub fn owners(mesh: &Mesh, subdomains: &[Subdomain]) -> Vec<u32> {
 
 /// What each worker's sub-domains cost in a cycle (element-cycles): their living elements, and all their nodes at `node` each.
 pub fn work(subdomains: &[Subdomain], n: usize, node: f64, living: &Living) -> Vec<f64> {
-    let mut work = vec![0.0; n];
+    held_by(subdomains, n, living).iter().map(|held| held.work(node)).collect()
+}
+
+/// Living elements and nodes of each worker.
+fn held_by(subdomains: &[Subdomain], n: usize, living: &Living) -> Vec<Held> {
+    let mut of_worker = vec![Held::default(); n];
     for s in subdomains {
-        let nodes = match &s.region {
+        let held = &mut of_worker[s.worker];
+        held.nodes += match &s.region {
             Region::Cells { low, high } => (0..3).map(|a| f64::from(high[a] - low[a] + 1)).product(),
             Region::List(elements) => elements.len() as f64,
         };
-        work[s.worker] += node.mul_add(nodes, living.of(s.part, &s.region) as f64);
+        held.elements += living.of(s.part, &s.region) as f64;
     }
-    work
+    of_worker
 }
 
 /// Which elements of a mesh are alive, for counting them in boxes.
@@ -303,7 +333,7 @@ fn grouping(speeds: &[f64], seed: u64) -> Vec<usize> {
 fn cut_all(
     mesh: &Mesh,
     speeds: &[f64],
-    (order, axes): (&[usize], &[usize]),
+    (order, halves, axes): (&[usize], Halves, &[usize]),
     living: &Living,
 ) -> Vec<Subdomain> {
     let mut out = Vec::new();
@@ -315,7 +345,7 @@ fn cut_all(
                 let shortest = (0..3).fold(2, |best, a| if cells[a] < cells[best] { a } else { best });
                 if all.volume() > 0 {
                     let count = |cells: &Cells| living.in_box(part, cells);
-                    cut_planes(vec![all], (axes, shortest), order, speeds, &count, &mut pieces);
+                    cut_planes(vec![all], (axes, shortest), (order, halves), speeds, &count, &mut pieces);
                 }
             }
             Topology::Explicit { .. }
@@ -335,7 +365,7 @@ fn cut_all(
                     })
                     .collect();
                 let all = (0..n_elements as u32).collect();
-                bisect(all, &centres, order, speeds, &|e| living.counts(part, e), &mut pieces);
+                bisect(all, &centres, (order, halves), speeds, &|e| living.counts(part, e), &mut pieces);
             }
         }
         pieces.retain(|(region, _): &(Region, usize)| region.n_elements() > 0);
@@ -354,162 +384,11 @@ fn fastest(workers: &[usize], speeds: &[f64]) -> usize {
     workers.iter().copied().fold(workers[0], |best, w| if speeds[w] > speeds[best] { w } else { best })
 }
 
-/// Recursive bisection along index planes, of all boxes together. Where whole planes miss the share of the workers, the
-/// last plane is divided once more, so that the miss is at most half a column along the part's shortest axis. Of `axes` it
-/// is that with the smaller interface.
-fn cut_planes(
-    boxes: Vec<Cells>,
-    (axes, shortest): (&[usize], usize),
-    workers: &[usize],
-    speeds: &[f64],
-    count: &dyn Fn(&Cells) -> u64,
-    out: &mut Vec<(Region, usize)>,
-) {
-    let volume: u64 = boxes.iter().map(count).sum();
-    if workers.len() == 1 || volume <= 1 {
-        let worker = fastest(workers, speeds);
-        out.extend(boxes.into_iter().map(|Cells { low, high }| (Region::Cells { low, high }, worker)));
-        return;
-    }
-    let middle = workers.len() / 2;
-    let mut best: Option<(f64, Cut, usize)> = None;
-    for split in [middle, workers.len() - middle] {
-        let target = volume as f64 * total(&workers[..split], speeds) / total(workers, speeds);
-        for &axis in axes {
-            let Some(whole) = Cut::whole(&boxes, axis, target, count) else { continue };
-            let interface = volume as f64 / whole.planes;
-            let near = NEAR * target.min(volume as f64 - target);
-            let (cut, dearer) = match Cut::jagged(&boxes, axis, shortest, target, count) {
-                Some(jagged) if whole.missed > near && jagged.missed < whole.missed => (jagged, JAG),
-                _ => (whole, 1.0),
-            };
-            let score = interface * dearer + cut.missed;
-            if best.as_ref().is_none_or(|(least, ..)| score < least * (1.0 - 1e-9)) {
-                best = Some((score, cut, split));
-            }
-        }
-    }
-    let Some((_, cut, split)) = best else {
-        let worker = fastest(workers, speeds);
-        out.extend(boxes.into_iter().map(|Cells { low, high }| (Region::Cells { low, high }, worker)));
-        return;
-    };
-    let (mut below, mut above) = (Vec::new(), Vec::new());
-    for cells in &boxes {
-        let (low, rest) = cells.at(cut.axis, cut.plane);
-        below.extend(low);
-        let Some(rest) = rest else { continue };
-        match cut.row {
-            None => above.push(rest),
-            Some((second, row)) => {
-                let (layer, beyond) = rest.at(cut.axis, cut.plane + 1);
-                above.extend(beyond);
-                let (low, high) = layer.map_or((None, None), |layer| layer.at(second, row));
-                below.extend(low);
-                above.extend(high);
-            }
-        }
-    }
-    cut_planes(below, (axes, shortest), &workers[..split], speeds, count, out);
-    cut_planes(above, (axes, shortest), &workers[split..], speeds, count, out);
-}
-
-/// Sets of axes to cut along, in the order in which equals are preferred: a lane set lies along I, so a cut across J has fewer of them at
-/// the border and leaves rows long.
-const AXES: &[&[usize]] = &[&[1, 0, 2], &[1, 0], &[1, 2], &[0, 2], &[1], &[0], &[2]];
-
-/// How near to the share of the workers whole planes have to come, relative to the smaller side.
-const NEAR: f64 = 0.002;
-/// How much a jagged interface counts against a plane one.
-const JAG: f64 = 1.1;
-
-/// A box of cells of a structured part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Cells {
-    low: [u32; 3],
-    high: [u32; 3],
-}
-
-impl Cells {
-    fn volume(&self) -> u64 {
-        (0..3).map(|a| u64::from(self.high[a] - self.low[a])).product()
-    }
-
-    /// How many nodes both have.
-    fn nodes_shared_with(&self, other: &Self) -> f64 {
-        let along = |a: usize| {
-            f64::from((self.high[a].min(other.high[a]) + 1).saturating_sub(self.low[a].max(other.low[a])))
-        };
-        (0..3).map(along).product()
-    }
-
-    /// What lies below index plane `plane` of an axis, and the rest.
-    fn at(&self, axis: usize, plane: u32) -> (Option<Self>, Option<Self>) {
-        let plane = plane.clamp(self.low[axis], self.high[axis]);
-        let (mut below, mut above) = (*self, *self);
-        below.high[axis] = plane;
-        above.low[axis] = plane;
-        ((below.volume() > 0).then_some(below), (above.volume() > 0).then_some(above))
-    }
-}
-
-/// Where boxes are cut: below a plane, and of that plane below a row of another axis.
-struct Cut {
-    axis: usize,
-    plane: u32,
-    row: Option<(usize, u32)>,
-    /// Elements beside the target.
-    missed: f64,
-    /// Planes along the axis that the boxes have on average.
-    planes: f64,
-}
-
-impl Cut {
-    /// The plane whose lower side is nearest to `target` elements, with something on both sides.
-    fn whole(boxes: &[Cells], axis: usize, target: f64, count: &dyn Fn(&Cells) -> u64) -> Option<Self> {
-        let low = boxes.iter().map(|c| c.low[axis]).min()?;
-        let high = boxes.iter().map(|c| c.high[axis]).max()?;
-        let missed = |plane: u32| (below(boxes, axis, plane, count) as f64 - target).abs();
-        let best = (low + 1..high).reduce(|a, b| if missed(b) < missed(a) { b } else { a })?;
-        let planes = f64::from(high - low);
-        Some(Self { axis, plane: best, row: None, missed: missed(best), planes })
-    }
-
-    /// The same with the plane that crosses the target divided along the longer of the other axes; no part is cut
-    /// along its shortest for that.
-    fn jagged(
-        boxes: &[Cells],
-        axis: usize,
-        shortest: usize,
-        target: f64,
-        count: &dyn Fn(&Cells) -> u64,
-    ) -> Option<Self> {
-        let second = if axis == shortest { (axis + 1) % 3 } else { 3 - axis - shortest };
-        let low = boxes.iter().map(|c| c.low[axis]).min()?;
-        let high = boxes.iter().map(|c| c.high[axis]).max()?;
-        let plane = (low..high).rev().find(|&plane| below(boxes, axis, plane, count) as f64 <= target)?;
-        let before = below(boxes, axis, plane, count) as f64;
-        let layer: Vec<Cells> = boxes
-            .iter()
-            .filter_map(|c| c.at(axis, plane).1)
-            .filter_map(|c| c.at(axis, plane + 1).0)
-            .collect();
-        let row = Self::whole(&layer, second, target - before, count)?;
-        let planes = f64::from(high - low);
-        Some(Self { axis, plane, row: Some((second, row.plane)), missed: row.missed, planes })
-    }
-}
-
-/// Elements that count below a plane.
-fn below(boxes: &[Cells], axis: usize, plane: u32, count: &dyn Fn(&Cells) -> u64) -> u64 {
-    boxes.iter().filter_map(|c| c.at(axis, plane).0).map(|c| count(&c)).sum()
-}
-
 /// Recursive coordinate bisection along the longest extent of the element centres; ties by element number.
 fn bisect(
     mut elements: Vec<u32>,
     centres: &[[f64; 3]],
-    workers: &[usize],
+    (workers, halves): (&[usize], Halves),
     speeds: &[f64],
     counts: &dyn Fn(u32) -> bool,
     out: &mut Vec<(Region, usize)>,
@@ -527,7 +406,7 @@ fn bisect(
     elements.sort_unstable_by(|&a, &b| {
         centres[a as usize][axis].total_cmp(&centres[b as usize][axis]).then(a.cmp(&b))
     });
-    let split = workers.len() / 2;
+    let [split, _] = halves.of(workers, speeds);
     let share = total(&workers[..split], speeds) / total(workers, speeds);
     let living = elements.iter().filter(|&&e| counts(e)).count();
     let lower = (living as f64 * share).round() as usize;
@@ -538,8 +417,8 @@ fn bisect(
         passed > lower
     });
     let upper = elements.split_off(end.unwrap_or(elements.len()));
-    bisect(elements, centres, &workers[..split], speeds, counts, out);
-    bisect(upper, centres, &workers[split..], speeds, counts, out);
+    bisect(elements, centres, (&workers[..split], halves), speeds, counts, out);
+    bisect(upper, centres, (&workers[split..], halves), speeds, counts, out);
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ fn every_element_is_dealt_once() {
     for n in [1, 2, 3, 4, 7, 16, 200] {
         let speeds: Vec<f64> = (0..n).map(|i| 1.0 + (i % 4) as f64).collect();
         let mesh = plate([30, 30, 10]);
-        let total: usize = shares(&decompose(&mesh, &speeds, NODE, None), n).iter().sum();
+        let total: usize = shares(&decompose(&mesh, &speeds, NODE, (None, true)), n).iter().sum();
         assert_eq!(total, 9000, "{n} workers");
     }
 }
@@ -38,7 +38,7 @@ fn every_element_is_dealt_once() {
 #[test]
 fn shares_follow_speeds_within_one_index_plane() {
     let speeds = [1.0, 2.0, 0.5];
-    let count = shares(&decompose(&plate([30, 30, 20]), &speeds, NODE, None), 3);
+    let count = shares(&decompose(&plate([30, 30, 20]), &speeds, NODE, (None, true)), 3);
     for (c, s) in count.iter().zip(speeds) {
         let ideal = 18_000.0 * s / 3.5;
         assert!((*c as f64 - ideal).abs() <= 600.0, "{count:?}: {c} against {ideal}");
@@ -47,7 +47,7 @@ fn shares_follow_speeds_within_one_index_plane() {
 
 #[test]
 fn equal_speeds_share_equally_where_planes_allow() {
-    assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16], NODE, None), 16), vec![1000; 16]);
+    assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16], NODE, (None, true)), 16), vec![1000; 16]);
 }
 
 /// Sixteen hosts with speeds of 1 to 4, by a small generator.
@@ -82,7 +82,8 @@ fn a_mixed_lab_ends_near_the_bound() {
         for seed in 0..20 {
             let speeds = mixed_lab(seed);
             let bound = f64::from(n * n * n) / speeds.iter().sum::<f64>();
-            let ratio = slowest_finish(&decompose(&plate([n; 3]), &speeds, NODE, None), &speeds) / bound;
+            let ratio =
+                slowest_finish(&decompose(&plate([n; 3]), &speeds, NODE, (None, true)), &speeds) / bound;
             (worst, sum) = (worst.max(ratio), sum + ratio);
             naive = naive.max(naive_slabs([n; 3], &speeds) / bound);
         }
@@ -103,7 +104,7 @@ fn facing_columns_of_thin_plates_fall_on_one_worker() {
     let mut both = plate([40, 40, thick[0]]);
     both.parts.extend(plate([40, 40, thick[1]]).parts);
     let mut owners = [vec![usize::MAX; 1600], vec![usize::MAX; 1600]];
-    for s in decompose(&both, &speeds, NODE, None) {
+    for s in decompose(&both, &speeds, NODE, (None, true)) {
         let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
         assert_eq!((low[2], high[2]), (0, thick[s.part]), "the thin axis stays whole");
         for j in low[1]..high[1] {
@@ -117,15 +118,15 @@ fn facing_columns_of_thin_plates_fall_on_one_worker() {
 
 #[test]
 fn cuts_leave_the_thin_axis_whole() {
-    for s in decompose(&plate([30, 30, 10]), &[1.0; 4], NODE, None) {
+    for s in decompose(&plate([30, 30, 10]), &[1.0; 4], NODE, (None, true)) {
         let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
         assert_eq!((low[2], high[2]), (0, 10));
     }
 }
 
-/// How many others each worker shares nodes with.
-fn neighbours(subdomains: &[Subdomain], n: usize) -> Vec<f64> {
-    Shared::new(subdomains, n).add_messages(vec![0.0; n], 0.5)
+/// What workers share.
+fn exchange(mesh: &Mesh, subdomains: &[Subdomain], n: usize) -> Exchange {
+    Exchange::new(mesh, subdomains, n, &Seams::default())
 }
 
 #[test]
@@ -133,10 +134,10 @@ fn where_messages_cost_much_columns_with_few_neighbours_are_cut() {
     let mesh = plate([100, 100, 75]);
     let most = |message| {
         let costs = Costs { message, ..NODE };
-        let subdomains = decompose(&mesh, &[1.0; 80], costs, None);
+        let subdomains = decompose(&mesh, &[1.0; 80], costs, (None, true));
         let elements = shares(&subdomains, 80);
         assert_eq!(elements.iter().sum::<usize>(), 750_000);
-        neighbours(&subdomains, 80).into_iter().fold(0.0, f64::max)
+        exchange(&mesh, &subdomains, 80).add_messages(vec![0.0; 80], 0.5).into_iter().fold(0.0, f64::max)
     };
     assert!(most(0.0) > 16.0, "blocks");
     assert!(most(65.0) <= 12.0, "columns: {}", most(65.0));
@@ -148,15 +149,108 @@ fn slow_wires_keep_blocks_with_few_shared_nodes() {
     let mesh = plate([100, 100, 75]);
     let shared = |byte| {
         let costs = Costs { message: 65.0, byte, ..NODE };
-        let nodes = Shared::new(&decompose(&mesh, &[1.0; 80], costs, None), 80).nodes;
-        nodes.into_iter().fold(0.0, f64::max)
+        let subdomains = decompose(&mesh, &[1.0; 80], costs, (None, true));
+        exchange(&mesh, &subdomains, 80).copies().into_iter().fold(0.0, f64::max)
     };
     assert!(shared(0.17) < shared(0.0), "{} at 1 Gb/s, {} without a wire", shared(0.17), shared(0.0));
-    let half = Shared { neighbours: vec![1], nodes: vec![100.0] };
-    assert_eq!(half.slowest(&[1000.0], &[1.0], 0.125), 1000.0, "600 beside 900 elements");
-    assert_eq!(half.slowest(&[1000.0], &[2.0], 0.125), 500.0 + 600.0 - 450.0);
     let halves = [[0, 50], [50, 100]].map(|[low, high]| Cells { low: [low, 0, 0], high: [high, 9, 4] });
     assert_eq!(halves[0].nodes_shared_with(&halves[1]), 50.0);
     let apart = Cells { low: [51, 0, 0], high: [60, 9, 4] };
     assert_eq!(halves[0].nodes_shared_with(&apart), 0.0);
+}
+
+/// 1,000 elements each, messages of 10, 50 from host to host, and frames of 100 shared nodes, which have 2,464 bytes.
+fn ends(pairs: &[[u32; 2]], speeds: &[f64], byte: f64) -> Vec<f64> {
+    let shared = pairs.iter().map(|&workers| exchange::Shared { workers, nodes: 100.0, border: 0.0 });
+    let exchange = Exchange::of(shared.collect(), speeds.len(), 24.0);
+    let held = vec![Held { elements: 1000.0, nodes: 0.0 }; speeds.len()];
+    exchange.ends(&held, speeds, Costs { message: 10.0, travel: 50.0, byte, ..Costs::NONE })
+}
+
+#[test]
+fn a_worker_waits_for_a_frame_that_arrives_after_its_elements() {
+    // The frame leaves at 10 and is there at 60 + 308, before 1,000 elements and two messages are done.
+    assert_eq!(ends(&[[0, 1]], &[1.0; 2], 0.125), [1020.0; 2]);
+    // It is there at 60 + 1,232.
+    assert_eq!(ends(&[[0, 1]], &[1.0; 2], 0.5), [1302.0; 2]);
+    // The faster one sends at 5 and is heard at 1,287; it hears at 1,292 and needs 5 for that.
+    assert_eq!(ends(&[[0, 1]], &[2.0, 1.0], 0.5), [1297.0; 2]);
+}
+
+#[test]
+fn frames_queue_on_the_wire_out_of_the_sender_and_on_that_into_the_receiver() {
+    // The last sends to the first and then to the second, whose frame leaves at 10 + 1,232. Both send to it at once, and it handles the second
+    // frame when it is there, at 60 + 2 x 1,232.
+    assert_eq!(ends(&[[0, 2], [1, 2]], &[1.0; 3], 0.5), [1302.0, 2534.0, 2534.0]);
+}
+
+#[test]
+fn borders_overlap_the_more_the_more_of_the_elements_they_are() {
+    let of = |borders| exchange::overlapping(borders, 1000.0);
+    assert_eq!(of(0.0), 0.0);
+    assert!((95.0..96.0).contains(&of(100.0)), "{}", of(100.0));
+    assert!((631.0..633.0).contains(&of(1000.0)), "{}", of(1000.0));
+    assert!(of(9000.0) < 1000.0);
+}
+
+#[test]
+fn workers_are_divided_where_both_sides_are_as_fast() {
+    let speeds = [7.0, 7.0, 7.0, 1.9, 1.9, 0.77, 0.77, 0.77, 0.3];
+    let order: Vec<usize> = (0..9).collect();
+    assert_eq!(Halves::Speed.of(&order, &speeds), [2, 2]);
+    assert_eq!(Halves::Speed.of(&order[2..], &speeds), [1, 1]);
+    assert_eq!(Halves::Count.of(&order, &speeds), [4, 5]);
+}
+
+/// Two blocks of unit cells, the second above the first; they share the nodes of their seam or stand a little apart.
+fn stack(below: [u32; 3], above: [u32; 3], is_joined: bool) -> Mesh {
+    let mut mesh = plate(below);
+    mesh.parts.extend(plate(above).parts);
+    let gap = if is_joined { 0.0 } else { 0.1 };
+    for (part, cells, bottom) in [(0, below, 0.0), (1, above, f64::from(below[2]) + gap)] {
+        for k in 0..=cells[2] {
+            for (j, i) in (0..=cells[1]).flat_map(|j| (0..=cells[0]).map(move |i| (j, i))) {
+                let seam =
+                    mesh.parts[0].nodes.len().saturating_sub(((cells[0] + 1) * (cells[1] + 1)) as usize);
+                let node = if part == 1 && is_joined && k == 0 {
+                    mesh.parts[0].nodes[seam + (i + j * (cells[0] + 1)) as usize]
+                } else {
+                    mesh.positions.push([f64::from(i), f64::from(j), bottom + f64::from(k)]);
+                    mesh.positions.len() as u32 - 1
+                };
+                mesh.parts[part].nodes.push(node);
+            }
+        }
+    }
+    mesh
+}
+
+#[test]
+fn parts_that_face_each_other_on_different_workers_exchange_what_lies_on_their_seam() {
+    let whole = |part, high, worker| Subdomain { part, region: Region::Cells { low: [0; 3], high }, worker };
+    let apart = [whole(0, [2, 2, 3], 0), whole(1, [2, 2, 1], 1)];
+    let nodes = |is_joined, touch, subdomains: &[Subdomain]| {
+        let seams = Seams::new(&stack([2, 2, 3], [2, 2, 1], is_joined), touch);
+        seams.between(subdomains).iter().map(|shared| shared.nodes).sum::<f64>()
+    };
+    assert_eq!(nodes(true, false, &apart), 9.0, "joined");
+    assert_eq!(
+        nodes(false, true, &apart),
+        45.0,
+        "nine nodes on each side, five exchanged for two that face each other"
+    );
+    assert_eq!(nodes(false, false, &apart), 0.0, "no contact");
+    let together = [whole(0, [2, 2, 3], 0), whole(1, [2, 2, 1], 0)];
+    assert_eq!(nodes(true, true, &together), 0.0);
+}
+
+#[test]
+fn on_slow_wires_parts_that_touch_are_cut_so_that_facing_pieces_stay_together() {
+    let mesh = stack([40, 40, 30], [40, 40, 10], false);
+    let exchanged = |touch| {
+        let costs = Costs { byte: 0.17, ..Costs::default() };
+        let subdomains = decompose(&mesh, &[1.0; 16], costs, (None, touch));
+        Seams::new(&mesh, true).between(&subdomains).iter().map(|shared| shared.nodes).sum::<f64>()
+    };
+    assert!(exchanged(true) < 0.2 * exchanged(false), "{} of {}", exchanged(true), exchanged(false));
 }

@@ -82,6 +82,8 @@ pub(super) struct Ground<'a> {
     pub(super) costs: Costs,
     /// Which elements are alive; none where nothing can erode.
     pub(super) alive: Option<&'a [bool]>,
+    /// Whether parts may touch.
+    pub(super) touch: bool,
 }
 
 /// Speeds that would be better, by position.
@@ -177,7 +179,7 @@ fn propose(medians: &[[f64; 2]], slowest: f64, shares: &Shares, ground: &Ground<
     if speeds == shares.speeds && held == shares.elements {
         return None;
     }
-    let layout = decompose(ground.mesh, &speeds, ground.costs, ground.alive);
+    let layout = decompose(ground.mesh, &speeds, ground.costs, (ground.alive, ground.touch));
     let elements = work(&layout, n, 0.0, &living);
     // Contact in elements, dealt out by speed.
     let truly: Vec<f64> = (0..n).map(|w| measured[w].unwrap_or(speeds[w] * usual)).collect();
@@ -204,7 +206,7 @@ mod tests {
     /// Two workers that were dealt `mesh` by equal speeds.
     fn shares(mesh: &Mesh) -> Shares {
         let speeds = vec![1.0, 1.0];
-        let layout = decompose(mesh, &speeds, Costs::NONE, None);
+        let layout = decompose(mesh, &speeds, Costs::NONE, (None, false));
         let elements = work(&layout, 2, 0.0, &Living::new(mesh, None));
         Shares { speeds, elements, layout }
     }
@@ -213,7 +215,7 @@ mod tests {
     fn a_worker_at_half_speed_is_given_half_of_the_work_of_the_other_and_told_so() {
         let mesh = bar();
         let shares = shares(&mesh);
-        let ground = Ground { mesh: &mesh, costs: Costs::NONE, alive: None };
+        let ground = Ground { mesh: &mesh, costs: Costs::NONE, alive: None, touch: false };
         let mut balancing = Balancing::default();
         assert!(!balancing.look((20, 20), &[[100.0, 0.0], [103.0, 0.0]], &shares, &ground), "they agree");
         assert!(balancing.look((40, 20), &[[100.0, 0.0], [200.0, 0.0]], &shares, &ground));
@@ -228,7 +230,7 @@ mod tests {
     fn after_a_change_that_brought_nothing_the_next_waits_twice_as_long_each_time() {
         let mesh = bar();
         let shares = shares(&mesh);
-        let ground = Ground { mesh: &mesh, costs: Costs::NONE, alive: None };
+        let ground = Ground { mesh: &mesh, costs: Costs::NONE, alive: None, touch: false };
         let mut balancing = Balancing::default();
         let slow = [[100.0, 0.0], [200.0, 0.0]];
         let mut changes = Vec::new();

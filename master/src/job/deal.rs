@@ -133,14 +133,15 @@ impl Job {
         let speeds: Vec<f64> = speeds.unwrap_or_else(|| specs.iter().map(|spec| spec.speed).collect());
         let costs = self.options.costs();
         let alive = alive_in(state);
-        let layout = decompose(&model.mesh, &speeds, costs, alive.as_deref());
+        let touch = model.setup.contact.is_some();
+        let layout = decompose(&model.mesh, &speeds, costs, (alive.as_deref(), touch));
         if model.output.workers {
             let owners: Arc<[u32]> = decompose::owners(&model.mesh, &layout).into();
             actions.push(Action::Owners(Arc::clone(&owners)));
             epoch.owners = Some(owners);
         }
         let threads: Vec<u32> = specs.iter().map(|spec| spec.threads).collect();
-        let held = held(&layout, n, costs, &Living::new(&model.mesh, alive.as_deref()));
+        let held = held(&model.mesh, &layout, n, costs, &Living::new(&model.mesh, alive.as_deref()));
         let n_bodies = model.setup.bodies.len() + checkpoint.continuation.formed.len();
         let dealt = (layout.as_slice(), held);
         let division = Division::new((model, n_bodies), state, dealt, &threads, problem.touching.as_ref());

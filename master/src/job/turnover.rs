@@ -135,7 +135,12 @@ impl Job {
         let Some(medians) = self.epoch.meter.medians() else { return false };
         let alive = self.epoch.sorts.eroded().map(crate::erosion::Eroded::alive);
         let (model, costs) = (&self.problem.model, self.options.costs());
-        let ground = Ground { mesh: &model.mesh, costs, alive: alive.as_deref() };
+        let ground = Ground {
+            mesh: &model.mesh,
+            costs,
+            alive: alive.as_deref(),
+            touch: model.setup.contact.is_some(),
+        };
         let interval = u64::from(model.setup.control.plan_interval);
         self.balancing.look((boundary, interval), &medians, &self.epoch.shares, &ground)
     }

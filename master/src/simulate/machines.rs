@@ -37,6 +37,7 @@ impl Costs {
             message: of(network.message),
             travel: of(network.latency),
             byte: of(8.0 / network.rate),
+            copy: of(network.byte),
         }
     }
 

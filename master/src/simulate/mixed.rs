@@ -118,7 +118,7 @@ impl Sorted {
     pub fn row(&self, edge: u32, seed: u64, speeds: &[f64], costs: Costs) -> Row {
         let Costs { node, pair, .. } = costs;
         let mesh = &self.model.mesh;
-        let layout = decompose(mesh, speeds, costs, None);
+        let layout = decompose(mesh, speeds, costs, (None, true));
         let living = Living::new(mesh, None);
         let elements = elements_of(&layout, speeds.len());
         let owner = owners(mesh, &layout);
@@ -128,7 +128,7 @@ impl Sorted {
         let pairs = self.pairs(&chosen, speeds.len());
 
         let slabs = slabs(mesh, speeds);
-        let whole = decompose(mesh, &[1.0], costs, None);
+        let whole = decompose(mesh, &[1.0], costs, (None, true));
         let slab_owner = owners(mesh, &slabs);
         let slab_owner = |node: u32| slab_owner[self.surface.nodes[node as usize] as usize] as usize;
         let slab_chosen = balance::assign_to_owners(&self.units, speeds.len(), &slab_owner);

@@ -1,0 +1,178 @@
+//! An estimate of the exchange of partial forces in a cycle, from which follows when the slowest worker ends it.
+//!
+//! Every worker computes its border elements and sends each neighbour a frame, in the order of the workers. A frame costs the processors at
+//! both ends, occupies the wire out of the sender, travels, and occupies the wire into the receiver. Interior elements
+//! are computed beside all that. A worker integrates when it has computed all elements and taken in all frames. It is what
+//! [`crate::simulate::virtual_clock`] charges, for one cycle that all begin at once.
+
+use mechanics::{mesh::Mesh, piece::Region};
+
+use super::{Subdomain, grids::Cells, seams::Seams};
+use crate::balance::Costs;
+
+/// Bytes of a frame beside its partial forces.
+const FRAME_BYTES: f64 = 64.0;
+/// Bytes of the partial force on a node.
+const FORCE_BYTES: f64 = 24.0;
+
+/// What each worker holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Held {
+    /// Living elements.
+    pub elements: f64,
+    pub nodes: f64,
+}
+
+impl Held {
+    /// Element-cycles of elements and nodes.
+    pub fn work(&self, node: f64) -> f64 {
+        node.mul_add(self.nodes, self.elements)
+    }
+}
+
+/// What two workers share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shared {
+    pub workers: [u32; 2],
+    pub nodes: f64,
+    /// Elements of each that touch the other's.
+    pub border: f64,
+}
+
+/// What workers share in structured parts.
+pub struct Exchange {
+    /// By worker, ascending: others and how many nodes it shares with them.
+    neighbours: Vec<Vec<(u32, f64)>>,
+    /// By worker: elements that touch the nodes that it shares.
+    border: Vec<f64>,
+    /// Bytes that a shared node takes in a frame.
+    node_bytes: f64,
+}
+
+/// A frame on its way.
+struct Frame {
+    to: u32,
+    /// When its first bits reach the wire into the receiver.
+    enters: f64,
+    bytes: f64,
+}
+
+impl Exchange {
+    /// Of sub-domains of `n` workers; `seams` say what different parts share.
+    pub fn new(mesh: &Mesh, subdomains: &[Subdomain], n: usize, seams: &Seams) -> Self {
+        let mut shared = seams.between(subdomains);
+        for part in subdomains.chunk_by(|one, other| one.part == other.part) {
+            shared_in_part(part, &mut shared);
+        }
+        let with_moments = mesh.parts.iter().any(mechanics::mesh::Part::turns_nodes);
+        let node_bytes = if with_moments { 2.0 * FORCE_BYTES } else { FORCE_BYTES };
+        Self::of(shared, n, node_bytes)
+    }
+
+    /// Of what pairs of workers share.
+    pub fn of(mut shared: Vec<Shared>, n: usize, node_bytes: f64) -> Self {
+        shared.iter_mut().for_each(|pair| pair.workers.sort_unstable());
+        shared.sort_by_key(|pair| pair.workers);
+        let mut neighbours: Vec<Vec<(u32, f64)>> = vec![Vec::new(); n];
+        let mut border = vec![0.0; n];
+        for same in shared.chunk_by(|a, b| a.workers == b.workers) {
+            let nodes = same.iter().map(|pair| pair.nodes).sum();
+            let [one, other] = same[0].workers;
+            for (worker, other) in [(one, other), (other, one)] {
+                neighbours[worker as usize].push((other, nodes));
+                border[worker as usize] += same.iter().map(|pair| pair.border).sum::<f64>();
+            }
+        }
+        neighbours.iter_mut().for_each(|others| others.sort_unstable_by_key(|(other, _)| *other));
+        Self { neighbours, border, node_bytes }
+    }
+
+    /// Adds what messages cost: two for each neighbour.
+    pub fn add_messages(&self, mut work: Vec<f64>, message: f64) -> Vec<f64> {
+        for (work, others) in work.iter_mut().zip(&self.neighbours) {
+            *work += 2.0 * message * others.len() as f64;
+        }
+        work
+    }
+
+    /// Copies of its nodes that others hold, by worker.
+    #[cfg(test)]
+    pub fn copies(&self) -> Vec<f64> {
+        self.neighbours.iter().map(|others| others.iter().map(|(_, nodes)| nodes).sum()).collect()
+    }
+
+    /// When each worker ends a cycle.
+    pub fn ends(&self, held: &[Held], speeds: &[f64], costs: Costs) -> Vec<f64> {
+        let bytes_of = |nodes: f64| self.node_bytes.mul_add(nodes, FRAME_BYTES);
+        let handling = |bytes: f64| costs.copy.mul_add(bytes, costs.message);
+        let mut frames: Vec<Frame> = Vec::with_capacity(self.neighbours.iter().map(Vec::len).sum());
+        // By worker: when it has handed over its frames, and what messages take of it.
+        let mut sent: Vec<(f64, f64)> = Vec::with_capacity(speeds.len());
+        for (((others, border), held), speed) in
+            self.neighbours.iter().zip(&self.border).zip(held).zip(speeds)
+        {
+            let border = overlapping(*border, held.elements) / speed;
+            let (mut now, mut wire) = (border, 0.0_f64);
+            for &(to, nodes) in others {
+                let bytes = bytes_of(nodes);
+                now += handling(bytes) / speed;
+                let leaves = wire.max(now);
+                wire = costs.byte.mul_add(bytes, leaves);
+                frames.push(Frame { to, enters: leaves + costs.travel, bytes });
+            }
+            // As many come in, of the same lengths.
+            sent.push((now, 2.0 * (now - border)));
+        }
+        frames.sort_by(|a, b| a.to.cmp(&b.to).then(a.enters.total_cmp(&b.enters)));
+        let mut frames = frames.into_iter().peekable();
+        let mut ends = Vec::with_capacity(speeds.len());
+        for (worker, ((held, speed), (sent, messages))) in (0..).zip(held.iter().zip(speeds).zip(sent)) {
+            let (mut wire, mut done) = (0.0_f64, sent);
+            while let Some(Frame { enters, bytes, .. }) = frames.next_if(|frame| frame.to == worker) {
+                wire = costs.byte.mul_add(bytes, wire.max(enters));
+                done = done.max(wire) + handling(bytes) / speed;
+            }
+            ends.push(done.max(held.elements / speed + messages) + costs.node * held.nodes / speed);
+        }
+        ends
+    }
+}
+
+/// How many of so many elements are at borders, which overlap at edges and corners: those of a small sub-domain much.
+pub fn overlapping(borders: f64, elements: f64) -> f64 {
+    if elements > 0.0 { elements * (1.0 - libm::exp(-borders / elements)) } else { 0.0 }
+}
+
+/// Nodes that sub-domains of different workers share in one structured part.
+fn shared_in_part(part: &[Subdomain], shared: &mut Vec<Shared>) {
+    let mut boxes: Vec<(Cells, u32)> = part
+        .iter()
+        .filter_map(|s| match s.region {
+            Region::Cells { low, high } => Some((Cells { low, high }, s.worker as u32)),
+            Region::List(_) => None,
+        })
+        .collect();
+    if boxes.is_empty() {
+        return;
+    }
+    // A sweep along the axis across which boxes are thinnest.
+    let thickness = |a: usize| {
+        let planes = boxes.iter().map(|(cells, _)| cells.high[a]).max().unwrap_or(0);
+        boxes.iter().map(|(cells, _)| f64::from(cells.high[a] - cells.low[a])).sum::<f64>()
+            / f64::from(planes)
+    };
+    let thicknesses = [0, 1, 2].map(thickness);
+    let axis = (0..3).fold(0, |best, a| if thicknesses[a] < thicknesses[best] { a } else { best });
+    boxes.sort_by_key(|(cells, _)| cells.low[axis]);
+    let mut open: Vec<(Cells, u32)> = Vec::new();
+    for (cells, worker) in boxes {
+        open.retain(|(other, _)| other.high[axis] >= cells.low[axis]);
+        for (other, of) in &open {
+            let nodes = cells.nodes_shared_with(other);
+            if *of != worker && nodes > 0.0 {
+                shared.push(Shared { workers: [worker, *of], nodes, border: cells.border_with(other) });
+            }
+        }
+        open.push((cells, worker));
+    }
+}
