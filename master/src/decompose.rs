@@ -18,7 +18,7 @@ use mechanics::{
 
 use crate::balance::Costs;
 use exchange::{Exchange, Held};
-use grids::{AXES, Cells, cut_planes};
+use grids::{AXES, Cells, NEARS, cut_planes};
 use seams::Seams;
 
 /// A sub-domain: a region of a part on a worker.
@@ -55,6 +55,9 @@ const FAR: f64 = 1.5;
 /// estimate knows a wire less well than work.
 const WAITS: f64 = 1.03;
 
+/// A way to cut: the order of the workers, where they are divided, the axes to cut along, and how near to their share whole planes have to come.
+type How<'a> = (&'a [usize], Halves, &'a [usize], f64);
+
 /// Where the workers of an order are divided, again and again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Halves {
@@ -89,16 +92,33 @@ pub fn decompose(
     (alive, touch): (Option<&[bool]>, bool),
 ) -> Vec<Subdomain> {
     let n = speeds.len();
-    let living = Living::new(mesh, alive);
-    let mut best: Option<(f64, Vec<Subdomain>)> = None;
     let equal = speeds.iter().all(|s| *s == speeds[0]);
     let is_structured = |part: &mechanics::mesh::Part| matches!(part.topology, Topology::Structured { .. });
     let has_choice = n > 1 && costs.message > 0.0 && mesh.parts.iter().any(is_structured);
     let choices = if has_choice { AXES } else { &AXES[..1] };
-    let seams = if has_choice { Seams::new(mesh, touch) } else { Seams::default() };
     let (groupings, by_work) = if n < 3 || equal { (1, 0) } else { (GROUPINGS.min(2 + TRIED / n), BY_WORK) };
     // Contact is dealt out by work, so those that got fewer elements would get it, and with it more ghosts.
     let by_ends = if has_choice && !touch { BY_ENDS.min(TRIED / n) } else { 0 };
+    let mut search = Search {
+        mesh,
+        speeds,
+        costs,
+        living: Living::new(mesh, alive),
+        seams: if has_choice { Seams::new(mesh, touch) } else { Seams::default() },
+        best: None,
+    };
+    let first = grouping(speeds, 0);
+    let mut near = NEARS[0];
+    if has_choice {
+        let mut least = f64::INFINITY;
+        for tried in NEARS {
+            let end = |axes: &&[usize]| search.cut((&first, Halves::Count, axes, tried), (0, 0));
+            let end = choices.iter().map(end).fold(f64::INFINITY, f64::min);
+            if end < least {
+                (least, near) = (end, tried);
+            }
+        }
+    }
     // What each set of axes came to at the best.
     let mut ended = vec![f64::INFINITY; choices.len()];
     let by_count = (0..groupings).map(|seed| (seed, Halves::Count));
@@ -106,52 +126,75 @@ pub fn decompose(
     for (seed, halves) in by_count.chain(by_speed) {
         let order = grouping(speeds, seed as u64);
         for (axes, ended) in choices.iter().zip(&mut ended) {
-            let least = best.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
-            if ended.is_finite() && *ended > FAR * least {
-                continue;
-            }
-            let mut shares = speeds.to_vec();
-            for correction in 0..=by_work + by_ends {
-                let subdomains = cut_all(mesh, &shares, (&order, halves, axes), &living);
-                let held = held_by(&subdomains, n, &living);
-                let work: Vec<f64> = held.iter().map(|held| held.work(costs.node)).collect();
-                let computed: Vec<f64> = work.iter().zip(speeds).map(|(work, speed)| work / speed).collect();
-                let least = best.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
-                // An equal finish keeps the earlier grouping, and the first is the order the user gave.
-                let gain = if correction > by_work { WAITS } else { 1.0 + 1e-9 };
-                let is_better = |ends: &[f64]| last(ends) * gain < least;
-                let ends = if costs.message > 0.0 && is_better(&computed) {
-                    Exchange::new(mesh, &subdomains, n, &seams).ends(&held, speeds, costs)
-                } else {
-                    computed.clone()
-                };
-                *ended = ended.min(last(&ends));
-                let waits = last(&ends) > WAITS * last(&computed);
-                let far = waits && last(&ends) > NEAR * least;
-                if is_better(&ends) {
-                    best = Some((last(&ends), subdomains));
-                }
-                if far || correction >= by_work && !waits {
-                    break;
-                }
-                if correction < by_work {
-                    // Ragged pieces have more nodes: their workers get fewer elements in the next try.
-                    let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
-                    for (share, computed) in shares.iter_mut().zip(&computed) {
-                        *share *= if *computed > 0.0 { mean / computed } else { 1.0 };
-                    }
-                } else {
-                    // Those that end late because of wires get fewer too.
-                    let mean = ends.iter().sum::<f64>() / n as f64;
-                    shares
-                        .iter_mut()
-                        .zip(&ends)
-                        .for_each(|(share, end)| *share *= mean / end.max(0.1 * mean));
-                }
+            if !(ended.is_finite() && *ended > FAR * search.least()) {
+                *ended = ended.min(search.cut((&order, halves, axes, near), (by_work, by_ends)));
             }
         }
     }
-    best.map(|(_, subdomains)| subdomains).unwrap_or_default()
+    search.best.map(|(_, subdomains)| subdomains).unwrap_or_default()
+}
+
+/// The search for the cut whose slowest worker ends a cycle first.
+struct Search<'a> {
+    mesh: &'a Mesh,
+    speeds: &'a [f64],
+    costs: Costs,
+    living: Living,
+    seams: Seams,
+    /// The best so far, and when its slowest worker ends.
+    best: Option<(f64, Vec<Subdomain>)>,
+}
+
+impl Search<'_> {
+    /// When the slowest worker of the best cut ends.
+    fn least(&self) -> f64 {
+        self.best.as_ref().map_or(f64::INFINITY, |(least, _)| *least)
+    }
+
+    /// Cuts in one way: first by the speeds, then for shares that are corrected by the work of the cut before, at most `by_work` times, then
+    /// by the ends of the estimate. Gives when the slowest worker of the best of these cuts ends.
+    fn cut(&mut self, how: How<'_>, (by_work, by_ends): (usize, usize)) -> f64 {
+        let Self { mesh, speeds, costs, .. } = *self;
+        let n = speeds.len();
+        let mut ended = f64::INFINITY;
+        let mut shares = speeds.to_vec();
+        for correction in 0..=by_work + by_ends {
+            let subdomains = cut_all(mesh, &shares, how, &self.living);
+            let held = held_by(&subdomains, n, &self.living);
+            let work: Vec<f64> = held.iter().map(|held| held.work(costs.node)).collect();
+            let computed: Vec<f64> = work.iter().zip(speeds).map(|(work, speed)| work / speed).collect();
+            let least = self.least();
+            // An equal finish keeps the earlier grouping, and the first is the order the user gave.
+            let gain = if correction > by_work { WAITS } else { 1.0 + 1e-9 };
+            let is_better = |ends: &[f64]| last(ends) * gain < least;
+            let ends = if costs.message > 0.0 && is_better(&computed) {
+                Exchange::new(mesh, &subdomains, n, &self.seams).ends(&held, speeds, costs)
+            } else {
+                computed.clone()
+            };
+            ended = ended.min(last(&ends));
+            let waits = last(&ends) > WAITS * last(&computed);
+            let far = waits && last(&ends) > NEAR * least;
+            if is_better(&ends) {
+                self.best = Some((last(&ends), subdomains));
+            }
+            if far || correction >= by_work && !waits {
+                break;
+            }
+            if correction < by_work {
+                // Ragged pieces have more nodes: their workers get fewer elements in the next try.
+                let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
+                for (share, computed) in shares.iter_mut().zip(&computed) {
+                    *share *= if *computed > 0.0 { mean / computed } else { 1.0 };
+                }
+            } else {
+                // Those that end late because of wires get fewer too.
+                let mean = ends.iter().sum::<f64>() / n as f64;
+                shares.iter_mut().zip(&ends).for_each(|(share, end)| *share *= mean / end.max(0.1 * mean));
+            }
+        }
+        ended
+    }
 }
 
 /// What each worker's sub-domains cost in a cycle (element-cycles): living elements, nodes, and messages to those that share nodes.
@@ -333,7 +376,7 @@ fn grouping(speeds: &[f64], seed: u64) -> Vec<usize> {
 fn cut_all(
     mesh: &Mesh,
     speeds: &[f64],
-    (order, halves, axes): (&[usize], Halves, &[usize]),
+    (order, halves, axes, near): How<'_>,
     living: &Living,
 ) -> Vec<Subdomain> {
     let mut out = Vec::new();
@@ -345,7 +388,8 @@ fn cut_all(
                 let shortest = (0..3).fold(2, |best, a| if cells[a] < cells[best] { a } else { best });
                 if all.volume() > 0 {
                     let count = |cells: &Cells| living.in_box(part, cells);
-                    cut_planes(vec![all], (axes, shortest), (order, halves), speeds, &count, &mut pieces);
+                    let along = (axes, shortest, near);
+                    cut_planes(vec![all], along, (order, halves), speeds, &count, &mut pieces);
                 }
             }
             Topology::Explicit { .. }

@@ -4,12 +4,12 @@ use mechanics::piece::Region;
 
 use super::{Halves, fastest, total};
 
-/// Recursive bisection along index planes, of all boxes together. Where whole planes miss the share of the workers, the
+/// Recursive bisection along index planes, of all boxes together. Where whole planes miss the share of the workers by more than `near`, the
 /// last plane is divided once more, so that the miss is at most half a column along the part's shortest axis. Of `axes` it
 /// is that with the smaller interface.
 pub fn cut_planes(
     boxes: Vec<Cells>,
-    (axes, shortest): (&[usize], usize),
+    (axes, shortest, near): (&[usize], usize, f64),
     (workers, halves): (&[usize], Halves),
     speeds: &[f64],
     count: &dyn Fn(&Cells) -> u64,
@@ -27,9 +27,9 @@ pub fn cut_planes(
         for &axis in axes {
             let Some(whole) = Cut::whole(&boxes, axis, target, count) else { continue };
             let interface = volume as f64 / whole.planes;
-            let near = NEAR * target.min(volume as f64 - target);
+            let missed = near * target.min(volume as f64 - target);
             let (cut, dearer) = match Cut::jagged(&boxes, axis, shortest, target, count) {
-                Some(jagged) if whole.missed > near && jagged.missed < whole.missed => (jagged, JAG),
+                Some(jagged) if whole.missed > missed && jagged.missed < whole.missed => (jagged, JAG),
                 _ => (whole, 1.0),
             };
             let score = interface * dearer + cut.missed;
@@ -59,16 +59,17 @@ pub fn cut_planes(
             }
         }
     }
-    cut_planes(below, (axes, shortest), (&workers[..split], halves), speeds, count, out);
-    cut_planes(above, (axes, shortest), (&workers[split..], halves), speeds, count, out);
+    cut_planes(below, (axes, shortest, near), (&workers[..split], halves), speeds, count, out);
+    cut_planes(above, (axes, shortest, near), (&workers[split..], halves), speeds, count, out);
 }
 
 /// Sets of axes to cut along, in the order in which equals are preferred: a lane set lies along I, so a cut across J has fewer of them at
 /// the border and leaves rows long.
 pub const AXES: &[&[usize]] = &[&[1, 0, 2], &[1, 0], &[1, 2], &[0, 2], &[1], &[0], &[2]];
 
-/// How near to the share of the workers whole planes have to come, relative to the smaller side.
-const NEAR: f64 = 0.002;
+/// How near to the share of the workers whole planes have to come, relative to the smaller side. A plane that is divided brings shares
+/// nearer, and the workers at it more nodes and neighbours.
+pub const NEARS: [f64; 4] = [0.002, 0.02, 0.04, 0.08];
 /// How much a jagged interface counts against a plane one.
 const JAG: f64 = 1.1;
 
