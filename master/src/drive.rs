@@ -483,11 +483,14 @@ impl Driver {
         for action in actions {
             match action {
                 Action::Send(worker, message) => {
-                    let worker_link = &self.members[worker].link;
-                    if let Err(error) = worker_link.send(self.place, &message) {
-                        let why = format!("{} at {}: {error}", worker_link.spec.name, worker_link.address);
-                        self.lost.push_back((worker, why));
-                    }
+                    let sent = self.members[worker].link.send(self.place, &message);
+                    self.note_sent(worker, sent);
+                }
+                Action::Pieces(worker, cutting) => {
+                    let model = Arc::clone(self.job.model());
+                    let make = move || cutting.cut(&model.mesh);
+                    let sent = self.members[worker].link.send_later(self.place, make);
+                    self.note_sent(worker, sent);
                 }
                 Action::Sort(bench, x) => {
                     self.sorting += 1;
@@ -512,6 +515,15 @@ impl Driver {
             }
         }
         Ok(())
+    }
+
+    /// A worker to which nothing can be sent is lost.
+    fn note_sent(&mut self, worker: usize, sent: protocol::Result<()>) {
+        if let Err(error) = sent {
+            let worker_link = &self.members[worker].link;
+            let why = format!("{} at {}: {error}", worker_link.spec.name, worker_link.address);
+            self.lost.push_back((worker, why));
+        }
     }
 
     fn sort(&self, bench: Arc<SortBasis>, x: Gathered) {

@@ -11,6 +11,7 @@ use protocol::{
 use crate::{
     fragments::Runaway,
     incident::{Difference, Loss, Rebalance},
+    job::Cutting,
     results::history::HistoryRow,
     run_totals::RunTotals,
     snapshot::Snapshot,
@@ -61,6 +62,8 @@ pub enum Event {
 /// What a job wants done.
 pub enum Action {
     Send(usize, ToWorker),
+    /// Cut pieces and send them, in the order of what is sent.
+    Pieces(usize, Cutting),
     /// Sort; exactly one [`Event::Sorted`] answers it. Positions by surface node.
     Sort(Arc<SortBasis>, Gathered),
     /// Send [`Event::Timer`] in so many seconds.

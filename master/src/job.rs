@@ -13,6 +13,7 @@ mod balancing;
 mod by_tree;
 mod checkpoints;
 mod collect;
+mod cutting;
 mod deal;
 mod epoch;
 mod error;
@@ -50,6 +51,7 @@ use crate::{
 };
 use balancing::Balancing;
 use checkpoints::Checkpoints;
+pub use cutting::Cutting;
 use epoch::Epoch;
 use error::Breach;
 pub use error::Error;
@@ -300,21 +302,26 @@ impl Job {
                 }
                 Ok(())
             }
-            ToMaster::WorkerState { cycle, version, pieces, last, work } => {
+            ToMaster::Pieces { cycle, version, pieces } => {
                 if version != WORKER_STATE_VERSION {
                     return Err(Error::Worker(worker, Breach::ImageVersion(version)));
                 }
+                if self.epoch.schedule.stops_at(cycle) {
+                    let noted = self.twice.note_end((worker, n), &pieces);
+                    noted.map_err(|e| Error::Unencoded(e.to_string()))?;
+                }
+                let before = Arc::clone(&self.checkpoints.newest().state);
+                self.epoch.worker_states.add((worker, n), cycle, pieces, &before)
+            }
+            ToMaster::WorkerState { cycle, last, work } => {
                 let n_parts = self.problem.model.mesh.parts.len();
                 if let Some(what) = not_a_number(last.as_deref(), &[], n_parts) {
                     return self.blame(worker, cycle, &what, actions);
                 }
                 self.tally.note_work((index, self.workers.n()), work);
-                if last.is_some() {
-                    let noted = self.twice.note_end((worker, n), &pieces);
-                    noted.map_err(|e| Error::Unencoded(e.to_string()))?;
-                }
                 let before = Arc::clone(&self.checkpoints.newest().state);
-                match self.epoch.worker_states.add((worker, n), cycle, (pieces, last), &before)? {
+                let held = &self.epoch.shares.held;
+                match self.epoch.worker_states.end((worker, held), cycle, last, &before)? {
                     Some(worker_state) => self.collected(worker_state, actions),
                     None => Ok(()),
                 }

@@ -313,6 +313,7 @@ impl Sink for Output {
                 Ok(())
             }
             Action::Send(..)
+            | Action::Pieces(..)
             | Action::Sort(..)
             | Action::Timer(_)
             | Action::Dealt(_)

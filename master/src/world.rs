@@ -56,7 +56,7 @@ impl Parcel {
             Body::ToMaster(_, packed) | Body::ToWorker(packed) | Body::ToPeer { packed, .. } => {
                 packed.kind != Kind::Control
             }
-            Body::WorkerState(..) | Body::Assign(_) => false,
+            Body::FromHost(..) | Body::ToHost(_) => false,
         }
     }
 }
@@ -71,9 +71,9 @@ enum Body {
         plan: u64,
         packed: Packed,
     },
-    /// Handed over as it is: a state from a member, an assignment.
-    WorkerState(usize, Box<ToMaster>),
-    Assign(Box<ToWorker>),
+    /// Handed over as they are: pieces, from a member and to a host.
+    FromHost(usize, Box<ToMaster>),
+    ToHost(Box<ToWorker>),
 }
 
 /// A message that has arrived.
@@ -283,6 +283,14 @@ impl<S: Surroundings> World<S> {
                         self.post_to_worker(host, message)?;
                     }
                 }
+                Action::Pieces(member, cutting) => {
+                    let host = self.sessions.members[member];
+                    let job = self.sessions.job.as_ref();
+                    if let Some(job) = job.filter(|_| self.sessions.hosts[host].member == Some(member)) {
+                        let message = cutting.cut(&job.model().mesh);
+                        self.post_to_worker(host, message)?;
+                    }
+                }
                 Action::Sort(basis, x) => self.surroundings.sort(&self.sessions, basis, x)?,
                 Action::Timer(seconds) => self.surroundings.timer(seconds),
                 Action::Dismiss(member, _) => {
@@ -301,11 +309,11 @@ impl<S: Surroundings> World<S> {
 
     fn post_to_worker(&mut self, host: usize, message: ToWorker) -> Result<(), Error> {
         let elements = match &message {
-            ToWorker::Assign(assign) => assign.subdomains.iter().map(|s| n_elements(&s.pieces)).sum(),
+            ToWorker::Pieces { pieces, .. } => n_elements(pieces.iter().map(|(_, piece)| piece)),
             _ => 0,
         };
         let (bytes, body) = if elements > 0 && self.surroundings.hands_over(elements) {
-            (wire::measure_to_worker(&message)?, Body::Assign(Box::new(message)))
+            (wire::measure_to_worker(&message)?, Body::ToHost(Box::new(message)))
         } else {
             let packed = wire::pack_to_worker(&message)?;
             (packed.wire_bytes(), Body::ToWorker(packed))
@@ -375,11 +383,11 @@ impl<S: Surroundings> World<S> {
         let Some(member) = *member else { return Ok(()) };
         let epoch = session.epoch();
         let elements = match &message {
-            ToMaster::WorkerState { pieces, .. } => n_elements(pieces),
+            ToMaster::Pieces { pieces, .. } => n_elements(pieces),
             _ => 0,
         };
         let (bytes, body) = if elements > 0 && self.surroundings.hands_over(elements) {
-            (wire::measure_to_master(&message)?, Body::WorkerState(member, Box::new(message)))
+            (wire::measure_to_master(&message)?, Body::FromHost(member, Box::new(message)))
         } else {
             let packed = wire::pack_to_master(&message)?;
             (packed.wire_bytes(), Body::ToMaster(member, packed))
@@ -430,8 +438,8 @@ impl<S: Surroundings> World<S> {
                 let message = wire::unpack_to_peer(kind, &bytes)?;
                 Letter::ToPeer(host, PeerFrame { epoch, from: position, plan: Some(plan), message })
             }
-            Body::WorkerState(member, message) => Letter::ToMaster(member, epoch, *message),
-            Body::Assign(message) => Letter::ToWorker(host, *message),
+            Body::FromHost(member, message) => Letter::ToMaster(member, epoch, *message),
+            Body::ToHost(message) => Letter::ToWorker(host, *message),
         })
     }
 
@@ -453,8 +461,8 @@ impl<S: Surroundings> World<S> {
     }
 }
 
-fn n_elements(pieces: &[Piece]) -> usize {
-    pieces.iter().map(|piece| piece.elements.len()).sum()
+fn n_elements<'a>(pieces: impl IntoIterator<Item = &'a Piece>) -> usize {
+    pieces.into_iter().map(|piece| piece.elements.len()).sum()
 }
 
 /// What ends a run beside its job.

@@ -33,7 +33,8 @@ use std::fmt;
 /// 16: shells of four points and membranes, thicknesses by shell, springs, cables, and pressures that move.
 /// 17: votes and orders travel by a tree; processes of one machine may go on over memory.
 /// 18: workers may sort what they hold of the surface.
-pub const VERSION: u16 = 18;
+/// 19: pieces travel before the assignment or state that they belong to.
+pub const VERSION: u16 = 19;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

@@ -77,6 +77,8 @@ pub struct Settings {
     pub bulk_messages: usize,
     /// Bytes of those messages.
     pub bulk_bytes: usize,
+    /// Bulk messages that may be queued to be made.
+    pub later_messages: usize,
     /// After this long without a frame sent, a heartbeat goes out.
     pub heartbeat: Duration,
     /// After this long without a byte received, [`Receiver::receive`] gives [`Error::Silent`].
@@ -84,7 +86,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// 1,024 frames and 256 MiB; 256 messages and 2 GiB of bulk; a heartbeat each second, of
+    /// 1,024 frames and 256 MiB; 256 messages and 2 GiB of bulk, and 4,096 to be made; a heartbeat each second, of
     /// which [`MISSED_HEARTBEATS`] may be missed.
     fn default() -> Self {
         Self {
@@ -92,6 +94,7 @@ impl Default for Settings {
             queued_bytes: 256 << 20,
             bulk_messages: 16 * OPEN_STREAMS,
             bulk_bytes: 2 * MESSAGE_LIMIT,
+            later_messages: 4096,
             heartbeat: Duration::from_secs(1),
             silence: MISSED_HEARTBEATS * Duration::from_secs(1),
         }

@@ -1,8 +1,8 @@
 //! Every message: who sends it, when, and what comes back.
 //!
-//! A run, seen from one worker: `Assign` -> `Ready`; `Start`; then per cycle `Cycle` -> `Totals`; at a sort,
-//! `Plan` arrives ahead of its cycle and `Transfer` goes both ways at that cycle; `WorkerState` when asked; at the end
-//! `Report` and `WorkerState` with `last`, then `Release`. On route direct `Peers` comes before `Assign`, and partial forces go
+//! A run, seen from one worker: `Pieces`, `Assign` -> `Ready`; `Start`; then per cycle `Cycle` -> `Totals`; at a sort,
+//! `Plan` arrives ahead of its cycle and `Transfer` goes both ways at that cycle; `Pieces` and `WorkerState` when asked; at the end
+//! `Pieces`, `Report` and `WorkerState` with `last`, then `Release`. On route direct `Peers` comes before `Assign`, and partial forces go
 //! from worker to worker as [`ToPeer`].
 //!
 //! Where votes travel by a [`Tree`] of the workers, only its root sends the master [`ToMaster::Votes`] and hears `Totals`.
@@ -31,7 +31,7 @@ use crate::{options::Route, phase::Report};
 /// From the master to a worker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ToWorker {
-    /// First of a job, and of each epoch of it: all that the worker holds. Answered by `Ready`.
+    /// First of a job, and of each epoch of it: all that the worker holds, but for the pieces that came before. Answered by `Ready`.
     Assign(Box<Assign>),
     /// When every worker is ready: the orders for the first cycle and the one after.
     Start {
@@ -87,6 +87,14 @@ pub enum ToWorker {
     /// The job has heard nothing for long, and of a tree it hears only the votes of all: a worker that waits answers with
     /// [`ToMaster::At`], one that computes or is stuck does not.
     Where,
+    /// Before `Assign`: some of the pieces that the worker is to hold, in the order of its sub-domains, so that neither side needs room for all
+    /// of them in one message.
+    Pieces {
+        /// The epoch of the assignment to come.
+        epoch: u32,
+        /// With the number of the sub-domain that each is of.
+        pieces: Vec<(u32, Piece)>,
+    },
 }
 
 /// Who computes a job, for links between its workers. Its frame names the job and the epoch.
@@ -236,8 +244,10 @@ pub struct Assign {
     pub n_parts: u32,
     /// Quanta of the sums.
     pub quanta: Quanta,
-    /// Sub-domains with their state.
+    /// Sub-domains; their pieces have come before.
     pub subdomains: Vec<Subdomain>,
+    /// How many pieces each sub-domain has.
+    pub n_pieces: Vec<u32>,
     /// Global node of each gauge.
     pub gauges: Vec<u32>,
     /// Elements and contacts that votes are to speak of.
@@ -390,13 +400,16 @@ pub enum ToMaster {
         /// Six numbers by node of the plan's send list.
         state: Vec<f64>,
     },
-    /// State of all sub-domains at the start of a cycle.
-    WorkerState {
+    /// Some of the pieces of a state at the start of a cycle, in the worker's order.
+    Pieces {
         cycle: u64,
         /// Version of the form of a piece.
         version: u32,
-        /// The state.
         pieces: Vec<Piece>,
+    },
+    /// The state at the start of a cycle is whole: all its pieces have been sent.
+    WorkerState {
+        cycle: u64,
         /// Set at the end of the run, with the vote of the last cycle.
         last: Option<Box<Vote>>,
         /// What this worker's compute threads have used so far.
@@ -431,6 +444,29 @@ impl ToMaster {
     }
 }
 
+/// Elements whose pieces travel in one message: with some 270 bytes an element a message of 27 MB. A longer piece has one to itself.
+pub const ELEMENTS_AT_ONCE: usize = 100_000;
+
+/// Groups of neighbours, each of at most [`ELEMENTS_AT_ONCE`] elements or of one alone.
+pub fn at_once<T>(all: Vec<T>, n_elements: impl Fn(&T) -> usize) -> Vec<Vec<T>> {
+    let mut groups: Vec<Vec<T>> = Vec::new();
+    let mut room = 0;
+    for one in all {
+        let n = n_elements(&one);
+        match groups.last_mut() {
+            Some(group) if n <= room => {
+                room -= n;
+                group.push(one);
+            }
+            _ => {
+                room = ELEMENTS_AT_ONCE.saturating_sub(n);
+                groups.push(vec![one]);
+            }
+        }
+    }
+    groups
+}
+
 /// Version of [`Piece`] as it travels and is stored. 1: the fields of `mechanics::state::FIELDS` in their first order.
 /// 2: with damage and the time until an explosive is lit behind them. 3: with what has eroded. 4: with artificial viscosity,
 /// hourglass control and history variables of laws.
@@ -443,4 +479,18 @@ pub struct Work {
     pub compute_ns: u64,
     /// Of that, contact.
     pub contact_ns: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_travel_in_their_order_few_at_a_time_and_long_ones_alone() {
+        let sizes = vec![40_000, 50_000, 10_000, 1, 250_000, 0, 99_999, 2];
+        let groups = at_once(sizes, |&n| n);
+        let expected = [vec![40_000, 50_000, 10_000], vec![1], vec![250_000, 0], vec![99_999], vec![2]];
+        assert_eq!(groups, expected);
+        assert!(at_once(Vec::<usize>::new(), |&n| n).is_empty());
+    }
 }

@@ -64,15 +64,37 @@ impl Outbox {
         if packed.kind != Kind::Control {
             return self.sender.send(Frame::new(header, packed.bytes));
         }
-        let number = self.next;
-        self.next = number
-            .checked_add(1)
-            .ok_or_else(|| Error::Message("2^32 control messages on one link".into()))?;
+        let number = self.number()?;
         if packed.goes_in_bulk() {
             self.sender.send_bulk(header, u64::from(number), packed.bytes)
         } else {
             self.sender.send(Frame::new(Header { sequence: number, ..header }, packed.bytes))
         }
+    }
+
+    /// Queues a control message that is made when its turn comes ([`Sender::send_bulk_later`]), and returns at once. It keeps its place
+    /// among the others.
+    ///
+    /// # Errors
+    /// What [`Sender::send_bulk_later`] gives.
+    pub fn send_later(
+        &mut self,
+        place: Place,
+        make: impl FnOnce() -> Result<Packed> + Send + 'static,
+    ) -> Result<()> {
+        let Place { job, epoch, plan } = place;
+        let incarnation = self.incarnation;
+        let header = Header { job, epoch, plan, incarnation, ..Header::new(Kind::Control) };
+        let number = self.number()?;
+        self.sender.send_bulk_later(header, u64::from(number), Box::new(|| make().map(|packed| packed.bytes)))
+    }
+
+    fn number(&mut self) -> Result<u32> {
+        let number = self.next;
+        self.next = number
+            .checked_add(1)
+            .ok_or_else(|| Error::Message("2^32 control messages on one link".into()))?;
+        Ok(number)
     }
 
     /// The link underneath.
@@ -222,6 +244,53 @@ mod tests {
         assert!(letters.iter().all(|l| (l.header.job, l.header.plan) == (4, 9)));
         assert_eq!((letters[1].header.kind, &letters[1].bytes), (Kind::Control, &long));
         assert_eq!(letters[2].bytes, [1]);
+    }
+
+    #[tokio::test]
+    async fn messages_made_later_keep_their_place_and_are_made_as_their_turn_comes() {
+        use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
+        let (near, far) = tokio::io::duplex(4096);
+        let (sender, _kept) = split(near, Settings::default());
+        let (_answer, mut receiver) = split(far, Settings::default());
+        let mut outbox = Outbox::new(sender, 7);
+        let made = std::sync::Arc::new(AtomicUsize::new(0));
+        let length = 10 * CONTROL_LIMIT as usize;
+        outbox.send(Place::default(), control(vec![100])).expect("room");
+        for number in 0..10 {
+            let made = std::sync::Arc::clone(&made);
+            let make = move || {
+                assert_eq!(made.fetch_add(1, SeqCst), usize::from(number), "one after another");
+                Ok(control(vec![number; length]))
+            };
+            outbox.send_later(Place::default(), make).expect("room");
+        }
+        outbox.send(Place::default(), control(vec![101])).expect("room");
+        let mut inbox = Inbox::new(7, BULK_ON_THE_WAY);
+        let mut firsts = Vec::new();
+        while firsts.len() < 12 {
+            inbox.accept(receiver.receive().await.expect("a frame")).expect("in order");
+            while let Some(letter) = inbox.take() {
+                assert!(letter.bytes.len() == 1 || letter.bytes.len() == length);
+                firsts.push(letter.bytes[0]);
+                // At most one is on its way and one more is made.
+                let made = made.load(SeqCst);
+                assert!(made < firsts.len() + 2, "{made} are made before {} have come", firsts.len());
+            }
+        }
+        assert_eq!(firsts, [100, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 101]);
+    }
+
+    #[tokio::test]
+    async fn what_cannot_be_made_ends_the_link_with_its_reason() {
+        let (near, _far) = tokio::io::duplex(4096);
+        let (sender, _kept) = split(near, Settings::default());
+        let mut outbox = Outbox::new(sender.clone(), 7);
+        let too_long = Error::TooLong { what: "message", length: 9, limit: 8 };
+        let make = move || Err(too_long);
+        outbox.send_later(Place::default(), make).expect("room");
+        sender.ended().await;
+        let ended = sender.send(Frame::new(Header::new(Kind::Control), Vec::new())).expect_err("over");
+        assert_eq!(ended.to_string(), "message: length 9, limit 8");
     }
 
     #[test]

@@ -190,8 +190,12 @@ impl Runner {
     }
 
     fn send(&mut self, message: &ToMaster) -> Result<()> {
-        let place = self.watch.said(message, self.session.plan_hash());
+        let place = self.place_of(message);
         self.outbox.send(place, wire::pack_to_master(message)?)
+    }
+
+    fn place_of(&mut self, message: &ToMaster) -> Place {
+        self.watch.said(message, self.session.plan_hash())
     }
 
     /// Over the link of the pair, or relayed by the master.
@@ -213,6 +217,11 @@ impl Runner {
                         let of_cycle = matches!(message, ToMaster::Cycle { .. } | ToMaster::Votes { .. });
                         if last || (of_cycle && runner.is_report_due()) {
                             runner.report()?;
+                        }
+                        if matches!(message, ToMaster::Pieces { .. }) {
+                            // Packed one after another, so that there need not be room for all of them twice.
+                            let place = runner.place_of(&message);
+                            return runner.outbox.send_later(place, move || wire::pack_to_master(&message));
                         }
                         let worked = share(runner.busy, runner.machine.work());
                         runner.send(&message.stamped(worked))
@@ -297,6 +306,10 @@ impl Watch {
         if let ToWorker::Assign(assign) = message {
             self.place = Place { job: header.job, epoch: header.epoch, plan: assign.plan_hash };
             self.plans.clear();
+            return Ok(());
+        }
+        if matches!(message, ToWorker::Pieces { .. }) {
+            // Of the assignment to come.
             return Ok(());
         }
         let (theirs, ours) = ((header.job, header.epoch), (self.place.job, self.place.epoch));

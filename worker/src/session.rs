@@ -13,9 +13,9 @@ mod tree;
 
 use std::collections::{BTreeMap, VecDeque};
 
-use mechanics::{cycle::Neighbour, exact::Quantum, vote::Vote};
+use mechanics::{cycle::Neighbour, exact::Quantum, piece::Piece, vote::Vote};
 use protocol::{
-    message::{Assign, Orders, ToMaster, ToWorker, WORKER_STATE_VERSION},
+    message::{Assign, Orders, ToMaster, ToWorker, WORKER_STATE_VERSION, at_once},
     options::Route,
 };
 
@@ -70,6 +70,26 @@ const fn position_after(cycle: u64) -> u64 {
     cycle.saturating_add(2)
 }
 
+/// Gives the sub-domains of an assignment the pieces that have come.
+fn fill(assign: &mut Assign, pieces: Vec<(u32, Piece)>) -> Result<(), String> {
+    let mut place = 0;
+    for (id, piece) in pieces {
+        if assign.subdomains.get(place).is_none_or(|subdomain| subdomain.id != id) {
+            let found = assign.subdomains.iter().position(|subdomain| subdomain.id == id);
+            place = found.ok_or_else(|| {
+                format!("a piece of sub-domain {id}, the assignment has none of that number")
+            })?;
+        }
+        assign.subdomains[place].pieces.push(piece);
+    }
+    let found = assign.subdomains.iter().map(|subdomain| subdomain.pieces.len() as u32);
+    if !found.clone().eq(assign.n_pieces.iter().copied()) {
+        let found: Vec<u32> = found.collect();
+        return Err(format!("{found:?} pieces by sub-domain, the assignment says {:?}", assign.n_pieces));
+    }
+    Ok(())
+}
+
 /// The state of a worker's part in one job.
 #[derive(Debug)]
 pub struct Session {
@@ -81,6 +101,8 @@ pub struct Session {
     outdated: bool,
     /// An assignment that waits for that task's end.
     next: Option<Box<Assign>>,
+    /// Pieces of an assignment to come, with the number of their sub-domain, and its epoch.
+    coming: (u32, Vec<(u32, Piece)>),
     cycle: u64,
     first_cycle: u64,
     sort_lag: u64,
@@ -133,6 +155,7 @@ impl Session {
             busy: false,
             outdated: false,
             next: None,
+            coming: (0, Vec::new()),
             cycle: 0,
             first_cycle: 0,
             sort_lag: 0,
@@ -231,6 +254,18 @@ impl Session {
         }
     }
 
+    /// Passes an assignment of this epoch, or pieces of it, if it may come now.
+    fn expect(&self, epoch: u32) -> Result<(), String> {
+        let free = matches!(self.phase, Phase::Idle | Phase::Over);
+        if free || epoch > self.epoch {
+            return Ok(());
+        }
+        Err(format!(
+            "an assignment of epoch {epoch} while {:?} in epoch {}: a job is in hand",
+            self.phase, self.epoch
+        ))
+    }
+
     /// Drops all of the job in hand; a task under way goes on, for nothing.
     fn clear(&mut self) {
         let (busy, outdated) = (self.busy, self.busy || self.outdated);
@@ -268,14 +303,19 @@ impl Session {
                 }
                 Ok(())
             }
-            ToWorker::Assign(assign) => {
-                let free = matches!(self.phase, Phase::Idle | Phase::Over);
-                if !free && assign.epoch <= self.epoch {
-                    return Err(format!(
-                        "an assignment of epoch {} while {:?} in epoch {}: a job is in hand",
-                        assign.epoch, self.phase, self.epoch
-                    ));
+            ToWorker::Pieces { epoch, pieces } => {
+                self.expect(epoch)?;
+                if self.coming.0 != epoch {
+                    self.coming = (epoch, Vec::new());
                 }
+                self.coming.1.extend(pieces);
+                Ok(())
+            }
+            ToWorker::Assign(mut assign) => {
+                self.expect(assign.epoch)?;
+                let (epoch, pieces) = std::mem::take(&mut self.coming);
+                let pieces = if epoch == assign.epoch { pieces } else { Vec::new() };
+                fill(&mut assign, pieces)?;
                 self.clear();
                 self.phase = Phase::Loading;
                 self.epoch = assign.epoch;
@@ -378,13 +418,11 @@ impl Session {
                 } else {
                     None
                 };
-                actions.push(Action::Send(ToMaster::WorkerState {
-                    cycle: self.cycle,
-                    version: WORKER_STATE_VERSION,
-                    pieces,
-                    last,
-                    work,
-                }));
+                let (cycle, version) = (self.cycle, WORKER_STATE_VERSION);
+                for pieces in at_once(pieces, |piece| piece.elements.len()) {
+                    actions.push(Action::Send(ToMaster::Pieces { cycle, version, pieces }));
+                }
+                actions.push(Action::Send(ToMaster::WorkerState { cycle, last, work }));
                 if stop && self.sample_due {
                     self.phase = Phase::Proving;
                     let (quantum, time) = self.quantum_and_time()?;

@@ -59,6 +59,16 @@ impl WorkerLink {
         self.outbox.lock().unwrap_or_else(PoisonError::into_inner).send(place, packed)
     }
 
+    /// Queues a message to it that is made when its turn comes.
+    pub(crate) fn send_later(
+        &self,
+        place: Place,
+        make: impl FnOnce() -> ToWorker + Send + 'static,
+    ) -> protocol::Result<()> {
+        let mut outbox = self.outbox.lock().unwrap_or_else(PoisonError::into_inner);
+        outbox.send_later(place, || wire::pack_to_worker(&make()))
+    }
+
     /// The link's sending half.
     pub fn sender(&self) -> Sender {
         self.outbox.lock().unwrap_or_else(PoisonError::into_inner).sender().clone()

@@ -74,6 +74,8 @@ pub(super) struct Shares {
     pub(super) elements: Vec<f64>,
     /// Which worker has which elements.
     pub(super) layout: Vec<Subdomain>,
+    /// How many elements each holds, eroded ones too.
+    pub(super) held: Vec<u64>,
 }
 
 /// What work is dealt out over.
@@ -208,7 +210,7 @@ mod tests {
         let speeds = vec![1.0, 1.0];
         let layout = decompose(mesh, &speeds, Costs::NONE, (None, false));
         let elements = work(&layout, 2, 0.0, &Living::new(mesh, None));
-        Shares { speeds, elements, layout }
+        Shares { speeds, elements, layout, held: Vec::new() }
     }
 
     #[test]

@@ -83,7 +83,7 @@ impl Job {
     pub(super) fn is_early(&self, message: &ToMaster) -> bool {
         let schedule = &self.epoch.schedule;
         let follows = match message {
-            ToMaster::WorkerState { cycle, .. } => *cycle,
+            ToMaster::Pieces { cycle, .. } | ToMaster::WorkerState { cycle, .. } => *cycle,
             ToMaster::Sample { cycle, .. } if schedule.stops_at(*cycle) => *cycle,
             ToMaster::Sample { cycle, .. } => cycle.saturating_add(1),
             _ => return false,
@@ -96,7 +96,15 @@ impl Job {
     /// # Errors
     /// If there are more than can be.
     pub(super) fn hold(&mut self, worker: usize, message: ToMaster) -> Result<(), Error> {
-        if self.epoch.early.len() >= EARLY * self.epoch.n() {
+        let is_of_state = |message: &ToMaster| matches!(message, ToMaster::Pieces { .. });
+        let elements = |message: &ToMaster| match message {
+            ToMaster::Pieces { pieces, .. } => pieces.iter().map(|piece| piece.elements.len() as u64).sum(),
+            _ => 0,
+        };
+        let theirs = self.epoch.early.iter().filter(|(from, _)| *from == worker).map(|(_, held)| held);
+        let others = theirs.clone().filter(|held| !is_of_state(held)).count();
+        let held = theirs.map(elements).sum::<u64>() + elements(&message);
+        if others >= EARLY || held > EARLY as u64 * self.epoch.shares.held[worker] {
             return Err(Error::Worker(worker, Breach::TooEarly(self.epoch.schedule.completed())));
         }
         self.epoch.early.push((worker, message));

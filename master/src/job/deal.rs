@@ -7,7 +7,7 @@ use mechanics::{
     cycle::Subdomain,
     exact::Quanta,
     mesh::Mesh,
-    piece::{self, Piece, Region},
+    piece::{self, Region},
     rigid::switch,
     state::GlobalState,
     vote::Watched,
@@ -19,6 +19,7 @@ use super::{
     Ending, Job,
     balancing::{Balancing, Meter, Shares},
     checkpoints::{Checkpoint, Checkpoints},
+    cutting::{Block, Cutting},
     epoch::Epoch,
     error::Error,
     frames::Inflow,
@@ -144,7 +145,7 @@ impl Job {
         let held = held(&model.mesh, &layout, n, costs, &Living::new(&model.mesh, alive.as_deref()));
         let n_bodies = model.setup.bodies.len() + checkpoint.continuation.formed.len();
         let dealt = (layout.as_slice(), held);
-        let division = Division::new((model, n_bodies), state, dealt, &threads, problem.touching.as_ref());
+        let division = Division::new((model, n_bodies), dealt, &threads, problem.touching.as_ref());
         let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
         let dropped =
             epoch.sorts.eroded().map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
@@ -223,13 +224,17 @@ impl Job {
             _ => Vec::new(),
         };
         let by_workers = !sortings.is_empty();
-        for (position, subdomains) in division.by_worker.into_iter().enumerate() {
+        for (position, share) in division.by_worker.into_iter().enumerate() {
+            let Share { subdomains, n_pieces, blocks } = share;
+            let cuttings = Cutting::of(state, number, blocks);
+            actions.extend(cuttings.map(|cutting| Action::Pieces(at_work[position], cutting)));
             let assign = Assign {
                 epoch: number,
                 setup: setup.clone(),
                 n_parts: model.mesh.parts.len() as u32,
                 quanta: Quanta { force: checkpoint.continuation.quanta[0], ..problem.quanta },
                 subdomains,
+                n_pieces,
                 gauges: gauges.clone(),
                 watched: watched.clone(),
                 lanes: self.options.asked.lanes.clone(),
@@ -256,7 +261,9 @@ impl Job {
         epoch.inflow = Inflow::new(n, checkpoint.continuation.vote.clone());
         epoch.meter = Meter::new(n);
         epoch.at_work = at_work;
-        epoch.shares = Shares { speeds, elements, layout };
+        let mut held = vec![0; n];
+        layout.iter().for_each(|place| held[place.worker] += place.region.n_elements() as u64);
+        epoch.shares = Shares { speeds, elements, layout, held };
         Ok(epoch)
     }
 }
@@ -266,9 +273,18 @@ fn alive_in(state: &GlobalState) -> Option<Vec<bool>> {
     (!state.eroded.is_empty()).then(|| (0..state.eroded.len()).map(|e| !state.is_eroded(e)).collect())
 }
 
+/// What a worker is to hold.
+#[derive(Default)]
+struct Share {
+    /// Without their pieces.
+    subdomains: Vec<Subdomain>,
+    n_pieces: Vec<u32>,
+    blocks: Vec<Block>,
+}
+
 /// The sub-domains of a layout, and who holds what.
 struct Division {
-    by_worker: Vec<Vec<Subdomain>>,
+    by_worker: Vec<Share>,
     node_owners: NodeOwners,
     /// By worker: surface nodes that it owns, in the order of its gathering.
     gather: Vec<Vec<u32>>,
@@ -277,48 +293,33 @@ struct Division {
 impl Division {
     fn new(
         (model, n_bodies): (&Model, usize),
-        state: &GlobalState,
         (layout, work): (&[decompose::Subdomain], Vec<f64>),
         threads: &[u32],
         touching: Option<&Touching>,
     ) -> Self {
         let n = threads.len();
-        let mut subdomains: Vec<Subdomain> = Vec::with_capacity(layout.len());
-        let mut nodes_of: Vec<Vec<u32>> = Vec::with_capacity(layout.len());
-        for ((id, subdomain), regions) in layout.iter().enumerate().zip(blocks(&model.mesh, layout, threads))
-        {
-            let cut = |region: &Region| piece::cut(&model.mesh, state, subdomain.part, region);
-            let pieces: Vec<Piece> = regions.par_iter().map(cut).collect();
-            let n_nodes = pieces.iter().map(|p| p.nodes.len()).sum();
-            let mut nodes = Vec::with_capacity(n_nodes);
-            pieces.iter().for_each(|p| nodes.extend_from_slice(&p.nodes));
-            nodes.par_sort_unstable();
-            nodes.dedup();
-            nodes_of.push(nodes);
-            subdomains.push(Subdomain { id: id as u32, pieces, unowned: Vec::new(), surface: Vec::new() });
-        }
+        let nodes_of: Vec<Vec<u32>> =
+            layout.par_iter().map(|place| piece::nodes(&model.mesh, place.part, &place.region)).collect();
         let node_owners =
             NodeOwners::new(model.mesh.n_nodes(), work, layout, &nodes_of).with_bodies(n_bodies);
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
-        let mut by_worker: Vec<Vec<Subdomain>> = vec![Vec::new(); n];
-        for (mut subdomain, (place, nodes)) in subdomains.into_iter().zip(layout.iter().zip(&nodes_of)) {
-            let id = subdomain.id;
-            subdomain.unowned = nodes
-                .iter()
-                .copied()
-                .filter(|&node| node_owners.owner_subdomain[node as usize] != id)
-                .collect();
-            if let Some(Touching { surface, .. }) = touching {
+        let mut by_worker: Vec<Share> = (0..n).map(|_| Share::default()).collect();
+        let regions = blocks(&model.mesh, layout, threads);
+        for (((id, place), nodes), regions) in (0..).zip(layout).zip(&nodes_of).zip(regions) {
+            let is_unowned = |&node: &u32| node_owners.owner_subdomain[node as usize] != id;
+            let unowned = nodes.iter().copied().filter(is_unowned).collect();
+            let mut surface = Vec::new();
+            if let Some(touching) = touching {
                 let is_here = |node: &u32| nodes.binary_search(node).is_ok();
-                subdomain.surface = surface.nodes.iter().copied().filter(is_here).collect();
-                gather[place.worker].extend(
-                    subdomain
-                        .surface
-                        .iter()
-                        .filter(|&&node| node_owners.owner_subdomain[node as usize] == id),
-                );
+                surface.extend(touching.surface.nodes.iter().copied().filter(is_here));
+                let owned = surface.iter().filter(|node| !is_unowned(node));
+                gather[place.worker].extend(owned);
             }
-            by_worker[place.worker].push(subdomain);
+            let held = &mut by_worker[place.worker];
+            held.n_pieces.push(regions.len() as u32);
+            let of_region = |region| Block { subdomain: id, part: place.part, region };
+            held.blocks.extend(regions.into_iter().map(of_region));
+            held.subdomains.push(Subdomain { id, pieces: Vec::new(), unowned, surface });
         }
         Self { by_worker, node_owners, gather }
     }
@@ -331,6 +332,9 @@ const BLOCKS: usize = 4;
 /// Elements of a block below which its nodes, which other blocks have too, cost more than an even share gains.
 const ELEMENTS: usize = 2000;
 
+/// Elements that a block has at most, but for one that rounding gives it: pieces travel by blocks.
+const MOST: usize = 250_000;
+
 /// The blocks of each sub-domain: of a worker with several threads at least one for each, in proportion to the elements, and of each
 /// form of elements one of its own.
 fn blocks(mesh: &Mesh, layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<Region>> {
@@ -339,6 +343,7 @@ fn blocks(mesh: &Mesh, layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<
     let of_subdomain = |subdomain: &decompose::Subdomain| {
         let (all, threads) = (elements[subdomain.worker].max(1), threads[subdomain.worker].max(1) as usize);
         let n = if threads > 1 { (all / ELEMENTS).clamp(threads, BLOCKS * threads) } else { 1 };
+        let n = n.max(all.div_ceil(MOST));
         let regions = subdomain.region.split((n * subdomain.region.n_elements()).div_ceil(all).max(1));
         regions.into_iter().flat_map(|region| region.by_form(&mesh.parts[subdomain.part])).collect()
     };

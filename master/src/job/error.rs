@@ -126,6 +126,8 @@ pub enum Breach {
     Report(String),
     /// States of another version.
     ImageVersion(u32),
+    /// A state of so many elements, from a worker that holds others.
+    Elements { cycle: u64, elements: u64, held: u64 },
     /// It says twice that it is ready.
     ReadyTwice,
     /// A cycle before all were ready.
@@ -277,6 +279,12 @@ impl Breach {
                 f,
                 "worker {worker} sends images of version {version}, this master reads {WORKER_STATE_VERSION}"
             ),
+            Self::Elements { cycle, elements, held } => {
+                write!(
+                    f,
+                    "worker {worker} sends {elements} elements in its image of cycle {cycle}, it holds {held}"
+                )
+            }
             Self::ReadyTwice => write!(f, "worker {worker} is ready twice"),
             Self::BeforeStart(cycle) => write!(f, "worker {worker} sends cycle {cycle} before the start"),
             Self::TooEarly(cycle) => {

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use mechanics::{contact::PartBox, vote::Vote};
+use mechanics::{contact::PartBox, piece, vote::Vote};
 use protocol::{
     message::{SortedPatch, ToMaster, ToWorker, WORKER_STATE_VERSION, Work},
     options::{Balance, JobOptions, Route, SortBy},
@@ -40,6 +40,15 @@ fn specs(n: usize) -> Vec<WorkerSpec> {
 pub(super) fn job(n: usize) -> (Job, Vec<Action>) {
     let model = deck::read(DECK, "two cubes").expect("a good deck");
     Job::new(Arc::new(model), &specs(n), SessionOptions::default(), None).expect("a good problem")
+}
+
+/// All that a worker holds, as at the start, sent for a cycle.
+fn pieces(job: &Job, worker: usize, cycle: u64) -> ToMaster {
+    let held = job.epoch.shares.layout.iter().filter(|place| place.worker == worker);
+    let cut = |place: &crate::decompose::Subdomain| {
+        piece::cut(&job.problem.model.mesh, job.start_state(), place.part, &place.region)
+    };
+    ToMaster::Pieces { cycle, version: WORKER_STATE_VERSION, pieces: held.map(cut).collect() }
 }
 
 /// A job whose workers are ready and have their first orders, and the number of exchange nodes of each.
@@ -296,13 +305,8 @@ fn a_contact_deeper_than_nine_tenths_of_the_gap_stops_the_run_with_its_node() {
     let stops = |a: &Action| matches!(a, Action::Send(_, ToWorker::Totals { orders, .. }) if orders.stop && orders.collect);
     assert!(actions.iter().any(stops), "the state up to there is still gathered");
     let last = Some(Box::new(Vote { courant: 1e-4, ..Vote::empty(2) }));
-    let worker_state = ToMaster::WorkerState {
-        cycle: 3,
-        version: WORKER_STATE_VERSION,
-        pieces: Vec::new(),
-        last,
-        work: Work::default(),
-    };
+    assert!(job.apply(Event::Message(0, 0, pieces(&job, 0, 3))).is_empty(), "more is to come");
+    let worker_state = ToMaster::WorkerState { cycle: 3, last, work: Work::default() };
     let actions = job.apply(Event::Message(0, 0, worker_state));
     let reason = failure(&actions);
     assert!(
@@ -360,14 +364,8 @@ fn a_force_beyond_exact_sums_is_computed_again_by_others_and_ends_the_job_if_the
 #[test]
 fn images_of_another_version_are_refused_with_both_versions() {
     let (mut job, _) = started(1);
-    let worker_state = ToMaster::WorkerState {
-        cycle: 1,
-        version: WORKER_STATE_VERSION + 1,
-        pieces: Vec::new(),
-        last: None,
-        work: Work::default(),
-    };
-    let actions = job.apply(Event::Message(0, 0, worker_state));
+    let version = WORKER_STATE_VERSION + 1;
+    let actions = job.apply(Event::Message(0, 0, ToMaster::Pieces { cycle: 1, version, pieces: Vec::new() }));
     let reason = failure(&actions).to_owned();
     assert!(
         reason.contains(&WORKER_STATE_VERSION.to_string())
@@ -399,8 +397,7 @@ fn dealt_anew(cycles: u64, mut nanoseconds: impl FnMut(usize, u64) -> f64) -> Ve
     while let Some(action) = actions.pop_front() {
         let (worker, message) = match action {
             Action::Send(worker, ToWorker::Assign(assign)) => {
-                let pieces = assign.subdomains.iter().flat_map(|s| &s.pieces);
-                elements[worker] = pieces.map(|piece| piece.elements.len()).sum::<usize>() as f64;
+                elements[worker] = job.epoch.shares.held[worker] as f64;
                 exchange[worker] = assign.plan.exchange.len();
                 let vote = if assign.cycle == 0 { vote() } else { None };
                 (worker, ToMaster::Ready { vote, lanes: "scalar".into() })
@@ -416,18 +413,10 @@ fn dealt_anew(cycles: u64, mut nanoseconds: impl FnMut(usize, u64) -> f64) -> Ve
                 }
                 let stops = job.epoch.schedule.stops_at(cycle + 1);
                 if stops {
-                    let (pieces, work) = (Vec::new(), Work::default());
-                    let last = vote();
-                    (
-                        worker,
-                        ToMaster::WorkerState {
-                            cycle: cycle + 1,
-                            version: WORKER_STATE_VERSION,
-                            pieces,
-                            last,
-                            work,
-                        },
-                    )
+                    let pieces = pieces(&job, worker, cycle + 1);
+                    assert!(job.apply(Event::Message(worker, job.epoch(), pieces)).is_empty());
+                    let (last, work) = (vote(), Work::default());
+                    (worker, ToMaster::WorkerState { cycle: cycle + 1, last, work })
                 } else {
                     (worker, frame(cycle + 1, false, exchange[worker], busy[worker]))
                 }

@@ -113,7 +113,7 @@ impl Twice {
         }
     }
 
-    /// A worker's pieces have come, where all stop; `n` are at work.
+    /// Some of a worker's pieces have come, where all stop; `n` are at work.
     ///
     /// # Errors
     /// If they cannot be encoded.
@@ -123,10 +123,14 @@ impl Twice {
         pieces: &[Piece],
     ) -> protocol::Result<()> {
         if self.chosen {
-            let mut hasher = blake3::Hasher::new();
-            codec::encode_into(&pieces, &mut hasher)?;
             self.ends.resize(n, [0; 32]);
-            self.ends[position] = *hasher.finalize().as_bytes();
+            let end = &mut self.ends[position];
+            for piece in pieces {
+                let mut hasher = blake3::Hasher::new();
+                hasher.update(&*end);
+                codec::encode_into(piece, &mut hasher)?;
+                *end = *hasher.finalize().as_bytes();
+            }
         }
         Ok(())
     }

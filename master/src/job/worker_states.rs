@@ -15,7 +15,11 @@ use super::{
 
 /// A state on its way.
 struct Collecting {
-    pieces: Vec<Piece>,
+    /// With the pieces that have come.
+    state: GlobalState,
+    /// Elements that have come, by worker.
+    elements: Vec<u64>,
+    /// The workers whose pieces have all come.
     arrived: Vec<bool>,
     vote: Option<Vote>,
 }
@@ -43,43 +47,79 @@ impl WorkerStates {
         self.ordered.insert(cycle, (time, due));
     }
 
-    /// Adds the state of one of `n` workers; gives the whole state once all are here. What no cycle changes is taken from
-    /// `before`, the state that work was dealt out from.
+    /// Adds pieces of one of `n` workers. What no cycle changes is taken from `before`, the state that work was dealt out from.
     ///
     /// # Errors
-    /// If nobody asked for it, or it came before, or its pieces are none of the problem's.
+    /// If nobody asked for them, or all of this worker's have come before, or they are none of the problem's.
     pub(super) fn add(
         &mut self,
         (worker, n): (usize, usize),
         cycle: u64,
-        (pieces, last): (Vec<Piece>, Option<Box<Vote>>),
+        pieces: Vec<Piece>,
+        before: &GlobalState,
+    ) -> Result<(), Error> {
+        let collecting = self.collecting((worker, n), cycle, before)?;
+        for mut piece in pieces {
+            collecting.elements[worker] += piece.elements.len() as u64;
+            if before.is_outline() {
+                piece::put_back_statics(&mut piece, &mut collecting.state).map_err(Error::Problem)?;
+            }
+            piece::put_back(piece, &mut collecting.state).map_err(Error::Problem)?;
+        }
+        Ok(())
+    }
+
+    /// All pieces of one of the workers, which hold so many elements each, have come; gives the whole state once those of all have.
+    ///
+    /// # Errors
+    /// If nobody asked for them, or this was said before, or they are more or fewer than the worker holds.
+    pub(super) fn end(
+        &mut self,
+        (worker, held): (usize, &[u64]),
+        cycle: u64,
+        last: Option<Box<Vote>>,
         before: &GlobalState,
     ) -> Result<Option<Collected>, Error> {
-        let collecting = self.collecting.entry(cycle).or_insert_with(|| Collecting {
-            pieces: Vec::new(),
-            arrived: vec![false; n],
-            vote: None,
-        });
-        if std::mem::replace(&mut collecting.arrived[worker], true) {
-            return Err(Error::Worker(worker, Breach::Twice(Sent::WorkerState, cycle)));
+        let collecting = self.collecting((worker, held.len()), cycle, before)?;
+        let (elements, held) = (collecting.elements[worker], held[worker]);
+        if elements != held {
+            return Err(Error::Worker(worker, Breach::Elements { cycle, elements, held }));
         }
-        collecting.pieces.extend(pieces);
+        collecting.arrived[worker] = true;
         merge(&mut collecting.vote, last);
         if !collecting.arrived.iter().all(|a| *a) {
             return Ok(None);
         }
-        let Some(collected) = self.collecting.remove(&cycle) else { return Ok(None) };
-        let mut state = before.to_fill();
-        for mut piece in collected.pieces {
-            if before.is_outline() {
-                piece::put_back_statics(&mut piece, &mut state).map_err(Error::Problem)?;
-            }
-            piece::put_back(piece, &mut state).map_err(Error::Problem)?;
-        }
-        let ordered = self.ordered.remove(&cycle);
-        let (time, due) = ordered.ok_or(Error::Worker(worker, Breach::Unasked(Sent::WorkerState, cycle)))?;
+        let (Some(collected), Some((time, due))) =
+            (self.collecting.remove(&cycle), self.ordered.remove(&cycle))
+        else {
+            return Ok(None);
+        };
+        let Collecting { mut state, vote, .. } = collected;
         (state.cycle, state.time) = (cycle, time);
-        Ok(Some(Collected { state, vote: collected.vote, due }))
+        Ok(Some(Collected { state, vote, due }))
+    }
+
+    /// The state of a cycle to which a worker may still add.
+    fn collecting(
+        &mut self,
+        (worker, n): (usize, usize),
+        cycle: u64,
+        before: &GlobalState,
+    ) -> Result<&mut Collecting, Error> {
+        if !self.ordered.contains_key(&cycle) {
+            return Err(Error::Worker(worker, Breach::Unasked(Sent::WorkerState, cycle)));
+        }
+        let collecting = self.collecting.entry(cycle).or_insert_with(|| Collecting {
+            state: before.to_fill(),
+            elements: vec![0; n],
+            arrived: vec![false; n],
+            vote: None,
+        });
+        if collecting.arrived[worker] {
+            return Err(Error::Worker(worker, Breach::Twice(Sent::WorkerState, cycle)));
+        }
+        Ok(collecting)
     }
 }
 
@@ -92,17 +132,42 @@ mod tests {
         let (job, _) = job(2);
         let mut worker_states = WorkerStates::default();
         worker_states.order(8, 0.25, true);
-        let add = |worker_states: &mut WorkerStates, worker, cycle| {
-            worker_states.add((worker, 2), cycle, (Vec::new(), None), job.start_state())
+        let end = |worker_states: &mut WorkerStates, worker, cycle| {
+            worker_states.end((worker, &[0; 2]), cycle, None, job.start_state())
         };
-        assert!(add(&mut worker_states, 1, 8).expect("ordered").is_none());
-        let twice = add(&mut worker_states, 1, 8).err();
-        assert_eq!(twice, Some(Error::Worker(1, Breach::Twice(Sent::WorkerState, 8))));
-        let whole = add(&mut worker_states, 0, 8).expect("ordered").expect("both are here");
+        assert!(end(&mut worker_states, 1, 8).expect("ordered").is_none());
+        let twice = Some(Error::Worker(1, Breach::Twice(Sent::WorkerState, 8)));
+        assert_eq!(end(&mut worker_states, 1, 8).err(), twice);
+        assert_eq!(worker_states.add((1, 2), 8, Vec::new(), job.start_state()).err(), twice);
+        let whole = end(&mut worker_states, 0, 8).expect("ordered").expect("both are here");
         assert_eq!((whole.state.cycle, whole.state.time, whole.due), (8, 0.25, true));
         assert!(whole.vote.is_none());
-        assert!(add(&mut worker_states, 0, 9).expect("the first").is_none());
-        let unasked = add(&mut worker_states, 1, 9).err();
-        assert_eq!(unasked, Some(Error::Worker(1, Breach::Unasked(Sent::WorkerState, 9))));
+        let unasked = Some(Error::Worker(1, Breach::Unasked(Sent::WorkerState, 9)));
+        assert_eq!(end(&mut worker_states, 1, 9).err(), unasked);
+        assert_eq!(worker_states.add((1, 2), 9, Vec::new(), job.start_state()).err(), unasked);
+    }
+
+    #[test]
+    fn pieces_make_a_state_one_after_another_and_one_that_lacks_some_is_none() {
+        let (job, _) = job(2);
+        let (mesh, before) = (&job.problem.model.mesh, job.start_state());
+        let mut worker_states = WorkerStates::default();
+        worker_states.order(8, 0.25, false);
+        let part = |part| {
+            let region = piece::Region::Cells { low: [0; 3], high: [2; 3] };
+            let mut piece = piece::cut(mesh, before, part, &region);
+            piece.v.iter_mut().for_each(|v| *v = [part as f64; 3]);
+            piece
+        };
+        let end =
+            |worker_states: &mut WorkerStates, worker| worker_states.end((worker, &[16, 0]), 8, None, before);
+        assert!(end(&mut worker_states, 1).expect("it holds nothing").is_none());
+        worker_states.add((0, 2), 8, vec![part(0)], before).expect("the first");
+        let lacks = Breach::Elements { cycle: 8, elements: 8, held: 16 };
+        assert_eq!(end(&mut worker_states, 0).err(), Some(Error::Worker(0, lacks)));
+        worker_states.add((0, 2), 8, vec![part(1)], before).expect("the second");
+        let whole = end(&mut worker_states, 0).expect("all are here").expect("and of both workers");
+        let of_part = |part: usize| mesh.parts[part].nodes.iter().map(|&node| whole.state.v[node as usize]);
+        assert!((0..2).all(|part| of_part(part).all(|v| v == [part as f64; 3])));
     }
 }

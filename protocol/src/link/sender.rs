@@ -27,13 +27,47 @@ pub(super) struct Queue {
     urgent_bytes: usize,
     bulk: VecDeque<Chunker>,
     bulk_bytes: usize,
+    /// Bulk messages that are still to be made, and whether one is being made.
+    later: VecDeque<Later>,
+    is_making: bool,
     /// Whose turn it is among the first [`OPEN_STREAMS`] of `bulk`.
     turn: usize,
     senders: usize,
     finishing: bool,
 }
 
+/// A bulk message that is made when its turn comes.
+pub(super) struct Later {
+    header: Header,
+    stream: u64,
+    make: Box<dyn FnOnce() -> Result<Vec<u8>> + Send>,
+}
+
+impl Later {
+    /// Makes it, which may take long.
+    pub(super) fn make(self) -> Result<Chunker> {
+        Chunker::new(self.header, self.stream, (self.make)()?)
+    }
+}
+
 impl Queue {
+    /// The next message to be made, if none is being made: one is under way to the peer meanwhile, and no further one takes memory.
+    pub(super) fn begin_making(&mut self) -> Option<Later> {
+        if self.is_making || self.bulk.len() > 1 {
+            return None;
+        }
+        let later = self.later.pop_front()?;
+        self.is_making = true;
+        Some(later)
+    }
+
+    /// It is made, and queued like others.
+    pub(super) fn made(&mut self, message: Chunker) {
+        self.is_making = false;
+        self.bulk_bytes += message.total();
+        self.bulk.push_back(message);
+    }
+
     /// The oldest frame that is no bulk. It counts as queued until [`Queue::written`].
     pub(super) fn pop_urgent(&mut self) -> Option<Frame> {
         self.urgent.pop_front()
@@ -77,7 +111,8 @@ impl Queue {
 
     /// Whether nothing is queued and nothing will be.
     pub(super) fn is_over(&self) -> bool {
-        (self.finishing || self.senders == 0) && self.urgent.is_empty() && self.bulk.is_empty()
+        let none_waits = self.urgent.is_empty() && self.bulk.is_empty() && self.later.is_empty();
+        (self.finishing || self.senders == 0) && none_waits && !self.is_making
     }
 }
 
@@ -136,6 +171,26 @@ impl Sender {
         queue.bulk_bytes = bytes;
         queue.bulk.push_back(message);
         self.shared.unwritten.store(true, Relaxed);
+        drop(queue);
+        self.shared.work.notify_one();
+        Ok(())
+    }
+
+    /// Queues a message of `stream` as [`send_bulk`](Self::send_bulk) does, which is made when those queued this way before have been, on a
+    /// thread that may take its time: of a long series two take memory at a time. What keeps one from being made ends the link.
+    ///
+    /// # Errors
+    /// [`Error::QueueFull`], or the error that ended the link.
+    pub fn send_bulk_later(
+        &self,
+        header: Header,
+        stream: u64,
+        make: Box<dyn FnOnce() -> Result<Vec<u8>> + Send>,
+    ) -> Result<()> {
+        let mut queue = lock(&self.shared.queue);
+        self.open(&queue)?;
+        within("queue of messages to be made", queue.later.len() + 1, self.shared.settings.later_messages)?;
+        queue.later.push_back(Later { header, stream, make });
         drop(queue);
         self.shared.work.notify_one();
         Ok(())

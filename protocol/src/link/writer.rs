@@ -14,6 +14,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::task::{Context, Poll, Waker, ready};
 use std::time::Duration;
 use tokio::io::AsyncWrite;
+use tokio::task::{JoinError, JoinHandle};
 
 /// Bytes of payload that a sender writes by itself; sums and copies of more are left to the writing task.
 pub(super) const DIRECT_BYTES: usize = 256 << 10;
@@ -183,7 +184,13 @@ pub(super) async fn write_out(shared: Arc<Shared>) {
 }
 
 async fn write_queue(shared: &Shared) -> Result<()> {
+    let mut making = None;
     loop {
+        if making.is_none() {
+            // While one message is on its way the next is made.
+            let later = lock(&shared.queue).begin_making();
+            making = later.map(|later| tokio::task::spawn_blocking(|| later.make()));
+        }
         std::future::poll_fn(|cx| poll_writer(shared, cx, |writer, cx| writer.poll(shared, true, cx)))
             .await?;
         if lock(&shared.queue).is_over() {
@@ -205,7 +212,24 @@ async fn write_queue(shared: &Shared) -> Result<()> {
         tokio::select! {
             () = shared.work.notified() => {}
             () = tokio::time::sleep(interval - quiet) => {}
+            made = next_made(&mut making) => {
+                making = None;
+                match made {
+                    Ok(Ok(message)) => lock(&shared.queue).made(message),
+                    Ok(Err(error)) => shared.fail(error),
+                    Err(panic) => shared.fail(Error::Message(format!("a bug in a message: {panic}"))),
+                }
+                shared.unwritten.store(true, Relaxed);
+            }
         }
+    }
+}
+
+/// What is being made, once it is; never, where nothing is. Cancel safe.
+async fn next_made<T>(making: &mut Option<JoinHandle<T>>) -> std::result::Result<T, JoinError> {
+    match making {
+        Some(making) => making.await,
+        None => std::future::pending().await,
     }
 }
 

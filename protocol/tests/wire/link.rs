@@ -339,6 +339,7 @@ async fn queues_toward_a_peer_that_does_not_read_are_bounded() {
         queued_bytes: 100,
         bulk_messages: 2,
         bulk_bytes: 1000,
+        later_messages: 1,
         ..Settings::default()
     };
     let (sender, _receiver) = split(near, settings);
@@ -355,6 +356,9 @@ async fn queues_toward_a_peer_that_does_not_read_are_bounded() {
     assert_eq!(bulk(400), Ok(()));
     assert_eq!(bulk(0), full("bulk queue", 3, 2));
     assert_eq!(sender.queued(), (3, 1000));
+    let later = || sender.send_bulk_later(Header::new(Kind::Bulk), 1, Box::new(|| Ok(Vec::new())));
+    assert_eq!(later(), Ok(()));
+    assert_eq!(later(), full("queue of messages to be made", 2, 1));
     let over = sender.send(frame(Kind::Heartbeat, 0, vec![0]));
     assert_eq!(over, Err(Error::TooLong { what: "heartbeat", length: 1, limit: 0 }));
     let bulk = sender.send(frame(Kind::Bulk, 0, Vec::new()));

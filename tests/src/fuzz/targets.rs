@@ -195,6 +195,10 @@ impl Said {
             (0..WORKERS).map(|_| (Session::new(), Machine::new())).collect();
         let mut actions: std::collections::VecDeque<Action> = first.into();
         while let Some(action) = actions.pop_front() {
+            let action = match action {
+                Action::Pieces(worker, cutting) => Action::Send(worker, cutting.cut(&model.mesh)),
+                action => action,
+            };
             match action {
                 Action::Send(worker, message) => {
                     let packed = wire::pack_to_worker(&message).unwrap_or_else(|e| panic!("the corpus: {e}"));

@@ -166,14 +166,7 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
     let mesh_part = &mesh.parts[part];
     let (topology, local_nodes, local_elements) = match (&mesh_part.topology, region) {
         (Topology::Structured { cells }, Region::Cells { low, high }) => {
-            let row = cells[0] + 1;
-            let plane = row * (cells[1] + 1);
-            let mut nodes = Vec::new();
-            for k in low[2]..=high[2] {
-                for j in low[1]..=high[1] {
-                    nodes.extend((low[0]..=high[0]).map(|i| i + j * row + k * plane));
-                }
-            }
+            let nodes = nodes_of_cells(*cells, *low, *high);
             let mut elements = Vec::new();
             for k in low[2]..high[2] {
                 for j in low[1]..high[1] {
@@ -265,6 +258,39 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         own,
         hourglass: mesh_part.hourglass,
     }
+}
+
+/// Global nodes of a region of part `part`, ascending, each once.
+pub fn nodes(mesh: &Mesh, part: usize, region: &Region) -> Vec<u32> {
+    let mesh_part = &mesh.parts[part];
+    let mut nodes: Vec<u32> = match (&mesh_part.topology, region) {
+        (Topology::Structured { cells }, Region::Cells { low, high }) => {
+            let local = nodes_of_cells(*cells, *low, *high);
+            local.into_iter().map(|n| mesh_part.nodes[n as usize]).collect()
+        }
+        (_, Region::List(list)) => {
+            let mut nodes = Vec::with_capacity(8 * list.len());
+            list.iter().for_each(|&e| nodes.extend_from_slice(&mesh_part.nodes_of(e as usize)));
+            nodes
+        }
+        (_, Region::Cells { .. }) => Vec::new(),
+    };
+    nodes.par_sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+/// Nodes of a box of cells of a grid, I fastest.
+fn nodes_of_cells(cells: [u32; 3], low: [u32; 3], high: [u32; 3]) -> Vec<u32> {
+    let row = cells[0] + 1;
+    let plane = row * (cells[1] + 1);
+    let mut nodes = Vec::with_capacity((0..3).map(|a| (high[a] - low[a] + 1) as usize).product());
+    for k in low[2]..=high[2] {
+        for j in low[1]..=high[1] {
+            nodes.extend((low[0]..=high[0]).map(|i| i + j * row + k * plane));
+        }
+    }
+    nodes
 }
 
 /// Corners of the listed elements by local node, and the nodes, numbered by first use, which keeps an element's corners close together.

@@ -2,7 +2,7 @@
 
 use super::*;
 use mechanics::{
-    cycle::{Ghost, Plan},
+    cycle::{Ghost, Plan, Subdomain},
     exact::Quanta,
     setup::{Control, Setup},
 };
@@ -39,6 +39,7 @@ pub(super) fn assign(cycle: u64) -> Box<Assign> {
         n_parts: 1,
         quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
         subdomains: Vec::new(),
+        n_pieces: Vec::new(),
         gauges: Vec::new(),
         watched: Default::default(),
         lanes: None,
@@ -217,6 +218,70 @@ fn a_second_assignment_of_the_same_epoch_names_the_phase() {
     assert!(
         matches!(&actions[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("Interior") && reason.contains("epoch 0"))
     );
+}
+
+/// A piece without nodes and elements.
+fn piece() -> Piece {
+    Piece {
+        part: 0,
+        material: 0,
+        topology: mechanics::mesh::Topology::Structured { cells: [0; 3] },
+        nodes: Vec::new(),
+        elements: Vec::new(),
+        x: Vec::new(),
+        v: Vec::new(),
+        mass: Vec::new(),
+        constraint: Vec::new(),
+        initial_volume: Vec::new(),
+        fields: Default::default(),
+        erosion: None,
+        contact: Vec::new(),
+        shells: Default::default(),
+        own: Vec::new(),
+        hourglass: Default::default(),
+        history: Vec::new(),
+    }
+}
+
+/// An assignment of this epoch, of two sub-domains that have so many pieces.
+fn divided(epoch: u32, n_pieces: [u32; 2]) -> ToWorker {
+    let subdomain = |id| Subdomain { id, pieces: Vec::new(), unowned: Vec::new(), surface: Vec::new() };
+    let subdomains = [4, 9].map(subdomain).into();
+    ToWorker::Assign(Box::new(Assign { epoch, subdomains, n_pieces: n_pieces.into(), ..*assign(0) }))
+}
+
+#[test]
+fn pieces_that_came_before_are_those_of_the_assignment_of_their_epoch() {
+    let mut session = Session::new();
+    let pieces = |epoch, ids: &[u32]| ToWorker::Pieces {
+        epoch,
+        pieces: ids.iter().map(|&id| (id, Piece { material: id, ..piece() })).collect(),
+    };
+    assert!(hear(&mut session, pieces(1, &[9, 9, 9])).is_empty(), "the epoch never began");
+    assert!(hear(&mut session, pieces(2, &[4, 4])).is_empty());
+    assert!(hear(&mut session, pieces(2, &[9])).is_empty());
+    let load = hear(&mut session, divided(2, [2, 1]));
+    let [Action::Compute(Task::Load { assign, .. })] = &load[..] else { panic!("{load:?}") };
+    let materials: Vec<Vec<u32>> =
+        assign.subdomains.iter().map(|s| s.pieces.iter().map(|piece| piece.material).collect()).collect();
+    assert_eq!(materials, [vec![4, 4], vec![9]]);
+}
+
+#[test]
+fn an_assignment_whose_pieces_have_not_come_says_which_and_so_does_a_piece_that_is_none_of_it() {
+    let refused = |said: Option<ToWorker>, assign: ToWorker| {
+        let mut session = Session::new();
+        said.into_iter().for_each(|said| assert!(hear(&mut session, said).is_empty()));
+        match &hear(&mut session, assign)[..] {
+            [Action::Send(ToMaster::Failed { reason, .. })] => reason.clone(),
+            other => panic!("{other:?}"),
+        }
+    };
+    let reason = refused(None, divided(0, [0, 1]));
+    assert_eq!(reason, "[0, 0] pieces by sub-domain, the assignment says [0, 1]");
+    let stray = ToWorker::Pieces { epoch: 0, pieces: vec![(5, piece())] };
+    let reason = refused(Some(stray), divided(0, [0, 0]));
+    assert_eq!(reason, "a piece of sub-domain 5, the assignment has none of that number");
 }
 
 #[test]

@@ -7,7 +7,7 @@
 
 /// From which size on an array is mapped by itself (bytes).
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-const LARGE: std::ffi::c_int = 4 << 20;
+const LARGE: std::ffi::c_int = 1 << 20;
 
 /// How many heaps there are. Cycles take little from them, so threads hardly wait for each other: runs of 64,000 elements took what they took
 /// before (medians of 14 turns).
