@@ -59,8 +59,25 @@ pub fn cut_planes(
             }
         }
     }
+    join(&mut below);
+    join(&mut above);
     cut_planes(below, (axes, shortest, near), (&workers[..split], halves), speeds, count, out);
     cut_planes(above, (axes, shortest, near), (&workers[split..], halves), speeds, count, out);
+}
+
+/// Joins boxes that make up one, as those of a divided plane do on both sides once they are cut across it.
+fn join(boxes: &mut Vec<Cells>) {
+    let mut one = 0;
+    while one < boxes.len() {
+        match (one + 1..boxes.len()).find_map(|other| Some((other, boxes[one].with(&boxes[other])?))) {
+            Some((other, both)) => {
+                boxes[one] = both;
+                boxes.remove(other);
+                one = 0;
+            }
+            None => one += 1,
+        }
+    }
 }
 
 /// Sets of axes to cut along, in the order in which equals are preferred: a lane set lies along I, so a cut across J has fewer of them at
@@ -107,6 +124,21 @@ impl Cells {
             [false, false, true] => cells(0) * cells(1),
             _ => 0.0,
         }
+    }
+
+    /// Both as one box, if they make up one.
+    pub fn with(&self, other: &Self) -> Option<Self> {
+        let differs =
+            |axis: &usize| (self.low[*axis], self.high[*axis]) != (other.low[*axis], other.high[*axis]);
+        let axis = (0..3).find(differs)?;
+        let abut = self.high[axis] == other.low[axis] || other.high[axis] == self.low[axis];
+        if !abut || (axis + 1..3).any(|axis| differs(&axis)) {
+            return None;
+        }
+        let mut both = *self;
+        both.low[axis] = self.low[axis].min(other.low[axis]);
+        both.high[axis] = self.high[axis].max(other.high[axis]);
+        Some(both)
     }
 
     /// What lies below index plane `plane` of an axis, and the rest.

@@ -254,3 +254,23 @@ fn on_slow_wires_parts_that_touch_are_cut_so_that_facing_pieces_stay_together() 
     };
     assert!(exchanged(true) < 0.2 * exchanged(false), "{} of {}", exchanged(true), exchanged(false));
 }
+
+#[test]
+fn what_many_workers_hold_of_a_part_are_few_boxes_of_which_no_two_make_up_one() {
+    let n = 150;
+    let costs = Costs { byte: 0.017, ..Costs::default() };
+    let subdomains = decompose(&plate([100, 100, 40]), &vec![1.0; n], costs, (None, false));
+    assert_eq!(shares(&subdomains, n).iter().sum::<usize>(), 400_000);
+    let boxes: Vec<(usize, Cells)> = subdomains
+        .iter()
+        .map(|s| match s.region {
+            Region::Cells { low, high } => (s.worker, Cells { low, high }),
+            Region::List(_) => panic!("the plate is structured"),
+        })
+        .collect();
+    for (at, (worker, cells)) in boxes.iter().enumerate() {
+        let same = boxes[at + 1..].iter().filter(|(other, _)| other == worker);
+        assert!(same.into_iter().all(|(_, other)| cells.with(other).is_none()), "worker {worker}");
+    }
+    assert!(boxes.len() <= 2 * n, "{} boxes", boxes.len());
+}
