@@ -320,8 +320,8 @@ impl Job {
                 }
                 self.tally.note_work((index, self.workers.n()), work);
                 let before = Arc::clone(&self.checkpoints.newest().state);
-                let held = &self.epoch.shares.held;
-                match self.epoch.worker_states.end((worker, held), cycle, last, &before)? {
+                let held = (!self.options.played).then(|| self.epoch.shares.held[worker]);
+                match self.epoch.worker_states.end((worker, n, held), cycle, last, &before)? {
                     Some(worker_state) => self.collected(worker_state, actions),
                     None => Ok(()),
                 }

@@ -30,6 +30,8 @@ pub struct SessionOptions {
     pub replay: bool,
     /// How votes and orders travel on route direct.
     pub tree: VoteTree,
+    /// What workers say is played from a tape of an emulated cluster, which keeps no pieces: states may lack theirs.
+    pub played: bool,
 }
 
 /// When votes and orders travel by a tree of workers, and which.

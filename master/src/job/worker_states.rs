@@ -69,20 +69,20 @@ impl WorkerStates {
         Ok(())
     }
 
-    /// All pieces of one of the workers, which hold so many elements each, have come; gives the whole state once those of all have.
+    /// All pieces of one of `n` workers, which holds so many elements if that is known, have come; gives the whole state once those of all have.
     ///
     /// # Errors
     /// If nobody asked for them, or this was said before, or they are more or fewer than the worker holds.
     pub(super) fn end(
         &mut self,
-        (worker, held): (usize, &[u64]),
+        (worker, n, held): (usize, usize, Option<u64>),
         cycle: u64,
         last: Option<Box<Vote>>,
         before: &GlobalState,
     ) -> Result<Option<Collected>, Error> {
-        let collecting = self.collecting((worker, held.len()), cycle, before)?;
-        let (elements, held) = (collecting.elements[worker], held[worker]);
-        if elements != held {
+        let collecting = self.collecting((worker, n), cycle, before)?;
+        let elements = collecting.elements[worker];
+        if let Some(held) = held.filter(|held| *held != elements) {
             return Err(Error::Worker(worker, Breach::Elements { cycle, elements, held }));
         }
         collecting.arrived[worker] = true;
@@ -133,7 +133,7 @@ mod tests {
         let mut worker_states = WorkerStates::default();
         worker_states.order(8, 0.25, true);
         let end = |worker_states: &mut WorkerStates, worker, cycle| {
-            worker_states.end((worker, &[0; 2]), cycle, None, job.start_state())
+            worker_states.end((worker, 2, Some(0)), cycle, None, job.start_state())
         };
         assert!(end(&mut worker_states, 1, 8).expect("ordered").is_none());
         let twice = Some(Error::Worker(1, Breach::Twice(Sent::WorkerState, 8)));
@@ -159,8 +159,9 @@ mod tests {
             piece.v.iter_mut().for_each(|v| *v = [part as f64; 3]);
             piece
         };
-        let end =
-            |worker_states: &mut WorkerStates, worker| worker_states.end((worker, &[16, 0]), 8, None, before);
+        let end = |worker_states: &mut WorkerStates, worker: usize| {
+            worker_states.end((worker, 2, Some([16, 0][worker])), 8, None, before)
+        };
         assert!(end(&mut worker_states, 1).expect("it holds nothing").is_none());
         worker_states.add((0, 2), 8, vec![part(0)], before).expect("the first");
         let lacks = Breach::Elements { cycle: 8, elements: 8, held: 16 };

@@ -91,6 +91,7 @@ pub fn run(
     let options = SessionOptions {
         keep: if come_and_go { CheckpointEvery::Seconds(KEEP_SECONDS) } else { CheckpointEvery::Never },
         waits: come_and_go,
+        played: tape.is_some(),
         ..scheme.options(machines.dealt_by)
     };
     let (mut job, first) =
