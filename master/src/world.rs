@@ -46,6 +46,8 @@ pub struct Parcel {
     pub bytes: u64,
     /// The sender computes as soon as it has been sent.
     pub before_task: bool,
+    /// Whether it is of a state that a worker sends.
+    pub of_state: bool,
     body: Body,
 }
 
@@ -319,8 +321,15 @@ impl<S: Surroundings> World<S> {
             (packed.wire_bytes(), Body::ToWorker(packed))
         };
         let epoch = self.sessions.hosts[host].session.epoch();
-        let parcel =
-            Parcel { from: End::Master, to: End::Host(host), epoch, bytes, before_task: false, body };
+        let parcel = Parcel {
+            from: End::Master,
+            to: End::Host(host),
+            epoch,
+            bytes,
+            before_task: false,
+            of_state: false,
+            body,
+        };
         self.surroundings.post(&self.sessions, parcel)
     }
 
@@ -382,6 +391,7 @@ impl<S: Surroundings> World<S> {
         // Nobody hears a host that the master does not know.
         let Some(member) = *member else { return Ok(()) };
         let epoch = session.epoch();
+        let of_state = matches!(message, ToMaster::Pieces { .. } | ToMaster::WorkerState { .. });
         let elements = match &message {
             ToMaster::Pieces { pieces, .. } => n_elements(pieces),
             _ => 0,
@@ -392,7 +402,8 @@ impl<S: Surroundings> World<S> {
             let packed = wire::pack_to_master(&message)?;
             (packed.wire_bytes(), Body::ToMaster(member, packed))
         };
-        let parcel = Parcel { from: End::Host(host), to: End::Master, epoch, bytes, before_task, body };
+        let parcel =
+            Parcel { from: End::Host(host), to: End::Master, epoch, bytes, before_task, of_state, body };
         self.surroundings.post(&self.sessions, parcel)
     }
 
@@ -413,7 +424,7 @@ impl<S: Surroundings> World<S> {
         let to = End::Host(members[*member]);
         let packed = wire::pack_to_peer(message)?;
         let (bytes, body) = (packed.wire_bytes(), Body::ToPeer { position, plan, packed });
-        let parcel = Parcel { from: End::Host(host), to, epoch, bytes, before_task, body };
+        let parcel = Parcel { from: End::Host(host), to, epoch, bytes, before_task, of_state: false, body };
         self.surroundings.post(&self.sessions, parcel)
     }
 

@@ -56,6 +56,8 @@ struct EmulatedWorker {
 struct Clock<'a> {
     machines: &'a Machines,
     overlap: bool,
+    /// Whether states are kept to go back to. Else they are what the run is for, of which cycles are measured.
+    keeps_states: bool,
     /// Of the machines' changes: those that have happened, which a run that goes back does not repeat.
     happened: Vec<bool>,
     places: Vec<EmulatedWorker>,
@@ -110,6 +112,7 @@ pub fn run(
     let clock = Clock {
         machines,
         overlap: scheme.overlap,
+        keeps_states: come_and_go,
         places: players
             .into_iter()
             .map(|player| EmulatedWorker {
@@ -369,13 +372,23 @@ impl Clock<'_> {
 
     /// A message goes to the sender's processor.
     fn hand_over(&mut self, sessions: &Sessions, sent: Sent) {
-        let (from, bytes) = (sent.parcel.from, sent.parcel.bytes);
-        self.handle(sessions, from, bytes, Work::Send(sent));
+        let (from, seconds) = (sent.parcel.from, self.handling(&sent));
+        self.handle(sessions, from, seconds, Work::Send(sent));
+    }
+
+    /// Whether a message takes no time: of states, where they are not kept to go back to. A tape has none of their pieces.
+    fn is_free(&self, sent: &Sent) -> bool {
+        sent.parcel.of_state && !self.keeps_states
+    }
+
+    /// What a message takes of a processor of speed 1 (s).
+    fn handling(&self, sent: &Sent) -> f64 {
+        if self.is_free(sent) { 0.0 } else { self.machines.network.handling(sent.parcel.bytes) }
     }
 
     /// A message has been sent: it goes on its way, or to the same host's other end.
     fn carry(&mut self, sessions: &Sessions, host: usize, sent: Sent) {
-        if host_of(sent.parcel.to) == host {
+        if host_of(sent.parcel.to) == host || self.is_free(&sent) {
             return self.take_in(sessions, sent);
         }
         match self.traffic.leave(self.now, host, sent.parcel.bytes) {
@@ -395,12 +408,12 @@ impl Clock<'_> {
             let (message, cycle, time) = (sent.number, sent.cycle, (sent.at, self.now));
             self.timeline.flights.push(Flight { message, hosts, cycle, bytes, time });
         }
-        self.handle(sessions, to, bytes, Work::Receive(sent));
+        let seconds = self.handling(&sent);
+        self.handle(sessions, to, seconds, Work::Receive(sent));
     }
 
-    /// Charges the processor of an end of a message for it.
-    fn handle(&mut self, sessions: &Sessions, end: End, bytes: u64, work: Work) {
-        let seconds = self.machines.network.handling(bytes);
+    /// Charges the processor of an end of a message for it: so many seconds of one of speed 1.
+    fn handle(&mut self, sessions: &Sessions, end: End, seconds: f64, work: Work) {
         if let End::Host(host) = end {
             let speed = self.machines.speeds[host];
             let cycle = sessions.hosts[host].session.cycle();
