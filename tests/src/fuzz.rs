@@ -4,6 +4,7 @@
 //! changed, cut, doubled and spliced bytes; lengths and floats of the kind that hurt). It may refuse the input in words; it
 //! may not panic, and what it accepts it must be able to go on with. A finding is a target and a number.
 
+mod said;
 mod targets;
 
 use std::{
