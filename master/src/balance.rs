@@ -8,6 +8,8 @@ use std::collections::BTreeSet;
 
 use mechanics::contact::WorkUnit;
 
+use crate::decompose::Fleet;
+
 /// What work costs in a cycle, in element-cycles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
@@ -41,6 +43,12 @@ impl Default for Costs {
 /// Interactions that cost as much as one element-cycle: of the plates of 64,000 elements 4.6 make a pair, and a pair costs
 /// 1.2 elements (`bolide simulate --decomposition --json`, `--measure-costs`).
 pub const INTERACTIONS_PER_ELEMENT: f64 = 3.8;
+
+/// How many times as long a byte takes between two regions as on the wire of a host: all workers of a region share that way.
+pub const FAR_BYTE: f64 = 10.0;
+
+/// Bytes that a node of a unit takes between the owner of its elements and another worker in a cycle: its position, and its force back.
+const NODE_BYTES: f64 = 48.0;
 
 /// How units are dealt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -141,13 +149,15 @@ pub fn assign_to_owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usi
 /// Worker of each unit. `weights` are the units' pairs; `work` is what the workers' sub-domains cost (element-cycles); `owner` gives the
 /// worker that owns a surface node's elements. A worker that finishes late by less than the messages of two new neighbours keeps its units,
 /// and it gives them to those with which it exchanges nodes in any case, unless another one would finish earlier by more than these messages.
+/// A unit leaves the region of its owner only if that gains more than the bytes of all units that do take between two regions.
 pub fn assign(
     units: &[WorkUnit],
     (weights, costs): (&[u64], Costs),
-    speeds: &[f64],
+    fleet: Fleet<'_>,
     work: &[f64],
     owner: &dyn Fn(u32) -> usize,
 ) -> Vec<usize> {
+    let speeds = fleet.speeds;
     let n = speeds.len();
     if n == 1 {
         return vec![0; units.len()];
@@ -169,21 +179,26 @@ pub fn assign(
     let mut known = if message > 0.0 { met(units, &chosen, n, owner) } else { Vec::new() };
     // Loosely bound units first, the heavier of equals first: fewer moves.
     giving.sort_by_key(|&u| (bound[u], std::cmp::Reverse(weights[u]), u));
+    // What units that have left their region take between two.
+    let mut between = 0.0;
     for u in giving {
         let (from, weight) = (chosen[u], weights[u]);
         let before = finish(from, load[from]);
         if before <= limit(from) {
             continue;
         }
+        let far = FAR_BYTE * costs.byte * NODE_BYTES * units[u].nodes.len() as f64;
         let after = |w: usize| {
             let is_new = message > 0.0 && w != from && !known[from].contains(&w);
-            finish(w, load[w] + weight) + if is_new { NEIGHBOUR * message / speeds[w] } else { 0.0 }
+            let new = if is_new { NEIGHBOUR * message / speeds[w] } else { 0.0 };
+            finish(w, load[w] + weight) + new + if fleet.are_near(from, w) { 0.0 } else { between + far }
         };
         let to = (0..n).fold(0, |best, w| if after(w) < after(best) { w } else { best });
         if to != from && after(to) < before {
             load[from] -= weight;
             load[to] += weight;
             chosen[u] = to;
+            between += if fleet.are_near(from, to) { 0.0 } else { far };
             if message > 0.0 {
                 known[from].insert(to);
                 known[to].insert(from);
@@ -227,7 +242,7 @@ mod tests {
         let units: Vec<_> = (0..8).map(|i| unit(i, vec![i as u32], 10)).collect();
         let owner = |n: u32| (n % 2) as usize;
         assert_eq!(
-            assign(&units, (&[10; 8], PAIRS), &[1.0, 1.0], &[1e4; 2], &owner),
+            assign(&units, (&[10; 8], PAIRS), Fleet::near(&[1.0, 1.0]), &[1e4; 2], &owner),
             [0, 1, 0, 1, 0, 1, 0, 1]
         );
     }
@@ -243,7 +258,8 @@ mod tests {
     fn an_overloaded_worker_gives_units_until_shares_follow_speeds() {
         let units: Vec<_> = (0..400).map(|i| unit(i, vec![i as u32], 10)).collect();
         let speeds = [1.0, 2.0, 1.0];
-        let chosen = assign(&units, (&[10; 400], PAIRS), &speeds, &[500.0, 1000.0, 500.0], &|_| 0);
+        let chosen =
+            assign(&units, (&[10; 400], PAIRS), Fleet::near(&speeds), &[500.0, 1000.0, 500.0], &|_| 0);
         for (w, s) in speeds.iter().enumerate() {
             let load = chosen.iter().filter(|&&c| c == w).count() as f64;
             let share = 100.0 * s;
@@ -255,7 +271,7 @@ mod tests {
     fn contact_levels_what_index_planes_left_uneven() {
         assert!((level(&[1.0, 1.0, 2.0], &[100.0, 110.0, 220.0], 40.0) - 117.5).abs() < 1e-9);
         let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 1)).collect();
-        let chosen = assign(&units, (&[1; 100], PAIRS), &[1.0, 1.0], &[1000.0, 1060.0], &|_| 1);
+        let chosen = assign(&units, (&[1; 100], PAIRS), Fleet::near(&[1.0, 1.0]), &[1000.0, 1060.0], &|_| 1);
         let first = chosen.iter().filter(|&&w| w == 0).count();
         // 120 elements' worth of pairs: 90 to the first, 30 to the other.
         assert!((70..=76).contains(&first), "{first}");
@@ -265,7 +281,10 @@ mod tests {
     fn a_worker_that_ends_its_elements_last_gets_no_contact() {
         assert_eq!(level(&[1.0, 1.0], &[100.0, 110.0], 8.0), 108.0);
         let units: Vec<_> = (0..6).map(|i| unit(i, vec![i as u32], 1)).collect();
-        assert_eq!(assign(&units, (&[1; 6], PAIRS), &[1.0, 1.0], &[100.0, 110.0], &|_| 1), [0; 6]);
+        assert_eq!(
+            assign(&units, (&[1; 6], PAIRS), Fleet::near(&[1.0, 1.0]), &[100.0, 110.0], &|_| 1),
+            [0; 6]
+        );
     }
 
     #[test]
@@ -284,12 +303,32 @@ mod tests {
         let receivers = |message: f64, first: f64| {
             let costs = Costs { message, ..PAIRS };
             let work: Vec<f64> = (0..20).map(|w| if w == 0 { first } else { 5000.0 }).collect();
-            let chosen = assign(&units, (&[10; 400], costs), &[1.0; 20], &work, &owner);
+            let chosen = assign(&units, (&[10; 400], costs), Fleet::near(&[1.0; 20]), &work, &owner);
             chosen.into_iter().filter(|&w| w != 0).collect::<BTreeSet<_>>().len()
         };
         assert_eq!(receivers(0.0, 5000.0), 19, "all share what costs no message");
         let few = receivers(65.0, 5000.0);
         assert!((2..=19).contains(&few), "{few}");
         assert_eq!(receivers(2000.0, 5000.0), 0, "4800 elements of pairs, 8000 of messages");
+    }
+
+    #[test]
+    fn units_leave_their_region_where_that_gains_more_than_their_bytes_take() {
+        let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 10)).collect();
+        // Contact is all in the first of two regions, and one of its two workers owns it.
+        let chosen = |byte: f64| {
+            let costs = Costs { byte, ..PAIRS };
+            let fleet = Fleet { speeds: &[1.0; 4], regions: &[0, 0, 1, 1] };
+            let chosen = assign(&units, (&[10; 100], costs), fleet, &[1e3; 4], &|_| 0);
+            [0, 1, 2, 3].map(|worker| chosen.iter().filter(|&&w| w == worker).count())
+        };
+        assert_eq!(chosen(0.0), [25; 4]);
+        assert_eq!(chosen(2.0), [50, 50, 0, 0], "960 for the bytes of a unit, and half of all pairs are 600");
+        let [one, other, two, three] = chosen(0.01);
+        assert!(
+            one.abs_diff(other) <= 1 && two > 5 && two < 25 && two.abs_diff(three) <= 1,
+            "{:?}",
+            [one, other, two, three]
+        );
     }
 }

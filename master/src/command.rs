@@ -429,6 +429,9 @@ pub struct WorkerArgs {
     /// id]
     #[arg(long)]
     pub name: Option<String>,
+    /// Name that it shares with the workers to which it has fast links, where not all links are fast: of a floor, a site
+    #[arg(long, value_name = "NAME")]
+    pub region: Option<String>,
     /// Folder with this host's certificates, as `bolide certs host` makes it
     #[arg(long, value_name = "FOLDER")]
     pub certs: Option<PathBuf>,

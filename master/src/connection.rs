@@ -334,7 +334,10 @@ impl Acceptor {
             Err(error) => error,
             Ok(_) => {
                 let worker_link = WorkerLink {
-                    spec: WorkerSpec { name: hello.name.clone(), speed: hello.speed, threads: hello.threads },
+                    spec: WorkerSpec {
+                        region: hello.region.clone(),
+                        ..WorkerSpec::new(&hello.name, hello.speed, hello.threads)
+                    },
                     address: address.clone(),
                     memory: hello.memory,
                     divides: hello.divides,

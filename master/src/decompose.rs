@@ -7,6 +7,7 @@
 //! slowest finish of elements, nodes and the exchange of partial forces ([`exchange`]). Elements that have eroded cost nothing
 //! ([`Living`]); they are dealt out all the same, since their state is still held.
 
+mod crew;
 mod exchange;
 mod grids;
 mod seams;
@@ -17,6 +18,8 @@ use mechanics::{
 };
 
 use crate::balance::Costs;
+use crew::{Crew, Halves};
+pub use crew::{Fleet, regions};
 use exchange::{Exchange, Held};
 use grids::{AXES, Cells, NEARS, cut_planes};
 use seams::Seams;
@@ -58,39 +61,16 @@ const WAITS: f64 = 1.03;
 /// A way to cut: the order of the workers, where they are divided, the axes to cut along, and how near to their share whole planes have to come.
 type How<'a> = (&'a [usize], Halves, &'a [usize], f64);
 
-/// Where the workers of an order are divided, again and again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Halves {
-    /// In the middle.
-    Count,
-    /// Where both sides are as fast.
-    Speed,
-}
-
-impl Halves {
-    /// How many workers are on the first side: two choices, which may be one.
-    fn of(self, workers: &[usize], speeds: &[f64]) -> [usize; 2] {
-        match self {
-            Self::Count => [workers.len() / 2, workers.len() - workers.len() / 2],
-            Self::Speed => {
-                let all = total(workers, speeds);
-                let uneven = |split: usize| (2.0 * total(&workers[..split], speeds) - all).abs();
-                let nearest = |a: usize, b: usize| if uneven(b) < uneven(a) { b } else { a };
-                [(1..workers.len()).reduce(nearest).unwrap_or(1); 2]
-            }
-        }
-    }
-}
-
-/// Cuts the mesh for workers of these relative speeds. Sub-domains come part by part, shells first; those without elements are left
+/// Cuts the mesh for these workers. Sub-domains come part by part, shells first; those without elements are left
 /// out, so a worker may have none in a small problem. `alive` says by global index which elements cost anything; all do
 /// where it is none. Structured parts that face each other exchange forces of contact if they `touch`.
 pub fn decompose(
     mesh: &Mesh,
-    speeds: &[f64],
+    fleet: Fleet<'_>,
     costs: Costs,
     (alive, touch): (Option<&[bool]>, bool),
 ) -> Vec<Subdomain> {
+    let speeds = fleet.speeds;
     let n = speeds.len();
     let equal = speeds.iter().all(|s| *s == speeds[0]);
     let is_structured = |part: &mechanics::mesh::Part| matches!(part.topology, Topology::Structured { .. });
@@ -101,13 +81,13 @@ pub fn decompose(
     let by_ends = if has_choice && !touch { BY_ENDS.min(TRIED / n) } else { 0 };
     let mut search = Search {
         mesh,
-        speeds,
+        fleet,
         costs,
         living: Living::new(mesh, alive),
         seams: if has_choice { Seams::new(mesh, touch) } else { Seams::default() },
         best: None,
     };
-    let first = grouping(speeds, 0);
+    let first = fleet.order(0);
     let mut near = NEARS[0];
     if has_choice {
         let mut least = f64::INFINITY;
@@ -124,7 +104,7 @@ pub fn decompose(
     let by_count = (0..groupings).map(|seed| (seed, Halves::Count));
     let by_speed = (0..groupings.min(BY_SPEED)).filter(|_| !equal).map(|seed| (seed, Halves::Speed));
     for (seed, halves) in by_count.chain(by_speed) {
-        let order = grouping(speeds, seed as u64);
+        let order = fleet.order(seed as u64);
         for (axes, ended) in choices.iter().zip(&mut ended) {
             if !(ended.is_finite() && *ended > FAR * search.least()) {
                 *ended = ended.min(search.cut((&order, halves, axes, near), (by_work, by_ends)));
@@ -137,7 +117,7 @@ pub fn decompose(
 /// The search for the cut whose slowest worker ends a cycle first.
 struct Search<'a> {
     mesh: &'a Mesh,
-    speeds: &'a [f64],
+    fleet: Fleet<'a>,
     costs: Costs,
     living: Living,
     seams: Seams,
@@ -154,12 +134,13 @@ impl Search<'_> {
     /// Cuts in one way: first by the speeds, then for shares that are corrected by the work of the cut before, at most `by_work` times, then
     /// by the ends of the estimate. Gives when the slowest worker of the best of these cuts ends.
     fn cut(&mut self, how: How<'_>, (by_work, by_ends): (usize, usize)) -> f64 {
-        let Self { mesh, speeds, costs, .. } = *self;
+        let Self { mesh, fleet, costs, .. } = *self;
+        let speeds = fleet.speeds;
         let n = speeds.len();
         let mut ended = f64::INFINITY;
         let mut shares = speeds.to_vec();
         for correction in 0..=by_work + by_ends {
-            let subdomains = cut_all(mesh, &shares, how, &self.living);
+            let subdomains = cut_all(mesh, fleet.with(&shares), how, &self.living);
             let held = held_by(&subdomains, n, &self.living);
             let work: Vec<f64> = held.iter().map(|held| held.work(costs.node)).collect();
             let computed: Vec<f64> = work.iter().zip(speeds).map(|(work, speed)| work / speed).collect();
@@ -168,7 +149,7 @@ impl Search<'_> {
             let gain = if correction > by_work { WAITS } else { 1.0 + 1e-9 };
             let is_better = |ends: &[f64]| last(ends) * gain < least;
             let ends = if costs.message > 0.0 && is_better(&computed) {
-                Exchange::new(mesh, &subdomains, n, &self.seams).ends(&held, speeds, costs)
+                Exchange::new(mesh, &subdomains, n, &self.seams).ends(&held, fleet, costs)
             } else {
                 computed.clone()
             };
@@ -354,31 +335,13 @@ pub fn slowest_finish(subdomains: &[Subdomain], speeds: &[f64]) -> f64 {
     cost.iter().zip(speeds).map(|(c, s)| c / s).fold(0.0, f64::max)
 }
 
-/// Seed 0: as given; 1: fastest first; others: shuffled by a small generator.
-fn grouping(speeds: &[f64], seed: u64) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..speeds.len()).collect();
-    match seed {
-        0 => {}
-        1 => order.sort_by(|&a, &b| speeds[b].total_cmp(&speeds[a])),
-        _ => {
-            let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            for i in (1..order.len()).rev() {
-                state ^= state << 13;
-                state ^= state >> 7;
-                state ^= state << 17;
-                order.swap(i, (state % (i as u64 + 1)) as usize);
-            }
-        }
-    }
-    order
-}
-
 fn cut_all(
     mesh: &Mesh,
-    speeds: &[f64],
-    (order, halves, axes, near): How<'_>,
+    fleet: Fleet<'_>,
+    (workers, halves, axes, near): How<'_>,
     living: &Living,
 ) -> Vec<Subdomain> {
+    let crew = Crew { fleet, workers, halves };
     let mut out = Vec::new();
     for (part, mesh_part) in mesh.parts.iter().enumerate() {
         let mut pieces = Vec::new();
@@ -389,7 +352,7 @@ fn cut_all(
                 if all.volume() > 0 {
                     let count = |cells: &Cells| living.in_box(part, cells);
                     let along = (axes, shortest, near);
-                    cut_planes(vec![all], along, (order, halves), speeds, &count, &mut pieces);
+                    cut_planes(vec![all], along, crew, &count, &mut pieces);
                 }
             }
             Topology::Explicit { .. }
@@ -409,7 +372,7 @@ fn cut_all(
                     })
                     .collect();
                 let all = (0..n_elements as u32).collect();
-                bisect(all, &centres, (order, halves), speeds, &|e| living.counts(part, e), &mut pieces);
+                bisect(all, &centres, crew, &|e| living.counts(part, e), &mut pieces);
             }
         }
         pieces.retain(|(region, _): &(Region, usize)| region.n_elements() > 0);
@@ -420,26 +383,17 @@ fn cut_all(
     out
 }
 
-fn total(workers: &[usize], speeds: &[f64]) -> f64 {
-    workers.iter().map(|&w| speeds[w]).sum()
-}
-
-fn fastest(workers: &[usize], speeds: &[f64]) -> usize {
-    workers.iter().copied().fold(workers[0], |best, w| if speeds[w] > speeds[best] { w } else { best })
-}
-
 /// Recursive coordinate bisection along the longest extent of the element centres; ties by element number.
 fn bisect(
     mut elements: Vec<u32>,
     centres: &[[f64; 3]],
-    (workers, halves): (&[usize], Halves),
-    speeds: &[f64],
+    crew: Crew<'_>,
     counts: &dyn Fn(u32) -> bool,
     out: &mut Vec<(Region, usize)>,
 ) {
-    if workers.len() == 1 || elements.len() <= 1 {
+    if crew.workers.len() == 1 || elements.len() <= 1 {
         elements.sort_unstable();
-        out.push((Region::List(elements), fastest(workers, speeds)));
+        out.push((Region::List(elements), crew.fastest()));
         return;
     }
     let extent = |axis: usize| {
@@ -450,8 +404,9 @@ fn bisect(
     elements.sort_unstable_by(|&a, &b| {
         centres[a as usize][axis].total_cmp(&centres[b as usize][axis]).then(a.cmp(&b))
     });
-    let [split, _] = halves.of(workers, speeds);
-    let share = total(&workers[..split], speeds) / total(workers, speeds);
+    let [split, _] = crew.splits();
+    let [first, others] = crew.divided(split);
+    let share = first.speed() / crew.speed();
     let living = elements.iter().filter(|&&e| counts(e)).count();
     let lower = (living as f64 * share).round() as usize;
     // Behind the last living element of the lower side.
@@ -461,8 +416,8 @@ fn bisect(
         passed > lower
     });
     let upper = elements.split_off(end.unwrap_or(elements.len()));
-    bisect(elements, centres, (&workers[..split], halves), speeds, counts, out);
-    bisect(upper, centres, (&workers[split..], halves), speeds, counts, out);
+    bisect(elements, centres, first, counts, out);
+    bisect(upper, centres, others, counts, out);
 }
 
 #[cfg(test)]

@@ -26,9 +26,16 @@ pub struct WorkerSpec {
     /// Relative speed, user-given.
     pub speed: f64,
     pub threads: u32,
+    /// Of the workers with fast links to each other; empty for those that name none.
+    pub region: String,
 }
 
 impl WorkerSpec {
+    /// A worker that names no region.
+    pub fn new(name: impl Into<String>, speed: f64, threads: u32) -> Self {
+        Self { name: name.into(), speed, threads, region: String::new() }
+    }
+
     /// It has so many threads from now on, and speed in proportion.
     pub fn compute_with(&mut self, threads: u32) {
         self.speed *= f64::from(threads) / f64::from(self.threads.max(1));

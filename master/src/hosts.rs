@@ -42,6 +42,8 @@ pub struct Host {
     pub threads: u32,
     /// Lane set.
     pub lanes: String,
+    /// Empty where it names none.
+    pub region: String,
     /// Where it called from.
     pub address: String,
     /// Drawn at the start of its process.
@@ -113,6 +115,7 @@ impl Hosts {
                 speed: hello.speed,
                 threads: hello.threads,
                 lanes: hello.lanes.clone(),
+                region: hello.region.clone(),
                 address: address.to_owned(),
                 nonce: hello.nonce,
                 incarnation,
@@ -215,7 +218,8 @@ impl Hosts {
                 State::Lost(why) => ("lost", why.clone()),
                 State::Left(why) => ("left", why.clone()),
             };
-            let words = [Some(note), host.slow.clone(), host.suspect.clone()];
+            let region = (!host.region.is_empty()).then(|| format!("region {}", host.region));
+            let words = [Some(note), region, host.slow.clone(), host.suspect.clone()];
             let words: Vec<String> = words.into_iter().flatten().filter(|words| !words.is_empty()).collect();
             let note = words.join(", ");
             HostRow {

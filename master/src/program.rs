@@ -145,6 +145,7 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
             Some(name) => name,
             None => name_of(args.certs.as_deref())?,
         },
+        region: args.region.unwrap_or_default(),
         speed,
         threads: args.threads.unwrap_or(cores),
         memory: args.memory.map(|gigabytes| (gigabytes * 1e9) as u64),

@@ -87,7 +87,7 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     let specs: Vec<WorkerSpec> = speeds_for(n, &args.speeds)?
         .into_iter()
         .enumerate()
-        .map(|(i, speed)| WorkerSpec { name: format!("worker-{i}"), speed, threads: threads as u32 })
+        .map(|(i, speed)| WorkerSpec::new(format!("worker-{i}"), speed, threads as u32))
         .collect();
     let path = (!asked.no_output).then(|| folder_for(args));
     // A run that resumes from its own folder goes on writing there.

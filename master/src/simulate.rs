@@ -171,6 +171,8 @@ struct Summary<'a> {
     /// Work of a cycle at speed 1 over the sum of speeds (s): no cluster is faster.
     bound: f64,
     bytes_per_cycle: f64,
+    /// Of these, those between hosts of different regions.
+    bytes_between_regions: f64,
     /// Mean phases of a cycle by worker (s).
     phases: Vec<Phases>,
     /// When work was dealt out by other speeds.
@@ -210,7 +212,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
     };
     let bound = calibrate::seconds(&costs, &work) / cluster.speeds.iter().sum::<f64>();
     let (timeline, _) = virtual_clock::run(&model, &machines, scheme, None)?;
-    let window = timeline.window();
+    let (window, regions) = (timeline.window(), &cluster.network.regions.of_host);
     let summary = Summary {
         cluster: &cluster.title,
         clock: "virtual",
@@ -222,6 +224,7 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         sec_per_cycle: timeline.seconds_per_cycle(),
         bound,
         bytes_per_cycle: timeline.bytes_per_cycle(),
+        bytes_between_regions: timeline.bytes_between(|from, to| regions.get(from) != regions.get(to)),
         phases: (0..cluster.speeds.len()).map(|worker| timeline.mean_phases(worker)).collect(),
         rebalances: &timeline.rebalances,
         losses: &timeline.losses,
@@ -246,6 +249,9 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         summary.bound,
         summary.bytes_per_cycle
     );
+    if summary.bytes_between_regions > 0.0 {
+        println!("between regions: {:.0} bytes/cycle", summary.bytes_between_regions);
+    }
     let [elements, nodes, pairs, searched, sorted] = work;
     println!(
         "work per cycle: {elements:.0} elements, {nodes:.0} nodes, {pairs:.0} pairs, {searched:.0} pairs of new plans, {sorted:.0} surface nodes sorted"

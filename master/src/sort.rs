@@ -17,6 +17,7 @@ use tracing::trace;
 
 use crate::{
     balance::{self, Costs, Dealing},
+    decompose::Fleet,
     exchange::Exchange,
     node_owners::NodeOwners,
     patches,
@@ -28,6 +29,8 @@ pub struct Sorter {
     settings: contact::Settings,
     exclusions: Arc<Exclusions>,
     speeds: Vec<f64>,
+    /// Region of each worker, by number.
+    regions: Vec<u32>,
     route: Route,
     dealing: Dealing,
     /// What a pair costs, in element-cycles.
@@ -85,7 +88,7 @@ impl Sorter {
         surface: Arc<Surface>,
         settings: contact::Settings,
         exclusions: Arc<Exclusions>,
-        speeds: Vec<f64>,
+        Fleet { speeds, regions }: Fleet<'_>,
         route: Route,
         dealing: Dealing,
         costs: Costs,
@@ -95,7 +98,8 @@ impl Sorter {
             .iter()
             .map(|nodes| nodes.iter().filter_map(|&node| surface.node_index(node)).collect())
             .collect();
-        Self { surface, settings, exclusions, speeds, route, dealing, costs, gather }
+        let (speeds, regions) = (speeds.to_vec(), regions.to_vec());
+        Self { surface, settings, exclusions, speeds, regions, route, dealing, costs, gather }
     }
 
     /// The same for another surface with the same nodes.
@@ -105,6 +109,7 @@ impl Sorter {
             settings: self.settings.clone(),
             exclusions: Arc::clone(&self.exclusions),
             speeds: self.speeds.clone(),
+            regions: self.regions.clone(),
             route: self.route,
             dealing: self.dealing,
             costs: self.costs,
@@ -158,7 +163,8 @@ impl Sorter {
         let worker_of = match self.dealing {
             Dealing::Owners => {
                 let weights = contact::cull(&mut units, &self.surface, x, &self.settings, &self.exclusions);
-                balance::assign(&units, (&weights, self.costs), &self.speeds, &node_owners.work, &owner)
+                let fleet = Fleet { speeds: &self.speeds, regions: &self.regions };
+                balance::assign(&units, (&weights, self.costs), fleet, &node_owners.work, &owner)
             }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
         };

@@ -278,7 +278,7 @@ fn interval(
     let model = Arc::new(model);
     let n = args.workers as usize;
     let threads = args.threads.map_or_else(worker::processors::cores, |threads| threads as usize);
-    let spec = |i| WorkerSpec { name: format!("worker-{i}"), speed: 1.0, threads: threads as u32 };
+    let spec = |i| WorkerSpec::new(format!("worker-{i}"), 1.0, threads as u32);
     let specs: Vec<WorkerSpec> = (0..n).map(spec).collect();
     let options = SessionOptions::of(&protocol::options::JobOptions::default(), n, true);
     let (mut job, actions) = Job::new(Arc::clone(&model), &specs, options, first.cloned())?;

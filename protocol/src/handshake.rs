@@ -34,7 +34,8 @@ use std::fmt;
 /// 17: votes and orders travel by a tree; processes of one machine may go on over memory.
 /// 18: workers may sort what they hold of the surface.
 /// 19: pieces travel before the assignment or state that they belong to.
-pub const VERSION: u16 = 19;
+/// 20: workers may name the region that they are in.
+pub const VERSION: u16 = 20;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;
@@ -129,6 +130,8 @@ pub struct Hello {
     pub memory: u64,
     /// Of a worker: whether it can give some of its threads to another connection. False for other roles.
     pub divides: bool,
+    /// Of a worker: the region of the virtual machine that it is in, characters as in `name`; empty where it names none, and for other roles.
+    pub region: String,
     /// The connection as the sender sees it, if it would go on over memory of this machine.
     pub near: Option<Ends>,
 }
@@ -158,6 +161,7 @@ impl Hello {
             proof: None,
             memory: 0,
             divides: false,
+            region: String::new(),
             near: None,
         }
     }
@@ -212,6 +216,9 @@ impl Hello {
         }
         if let Some(proof) = &self.proof {
             check_name("proof", proof, PROOF_LIMIT)?;
+        }
+        if !self.region.is_empty() {
+            check_name("region", &self.region, NAME_LIMIT)?;
         }
         Ok(())
     }

@@ -81,6 +81,24 @@ fn links_between_workers_under_tls_do_the_same() {
     links_relieve_the_master(true);
 }
 
+/// Six workers on two floors, in turn: hosts say where they are, and the bits are those of one.
+#[test]
+fn workers_of_two_regions_give_the_same_digest() {
+    let mut cluster = Cluster::start(BOLIDE, false);
+    for (i, name) in ["a", "b", "c", "d", "e", "f"].into_iter().enumerate() {
+        cluster.worker_with(name, "1", &["--region", ["ground-floor", "first-floor"][i % 2]]);
+    }
+    let hosts = cluster.json(&["hosts"]);
+    let notes: Vec<&str> =
+        hosts.as_array().expect("a list").iter().filter_map(|host| host["note"].as_str()).collect();
+    assert_eq!(notes[..2], ["region ground-floor", "region first-floor"]);
+    let summary = submit(&cluster, "6", &["--cycles", "40", "--route", "direct"]);
+    assert_eq!(digest_of(&summary), reference());
+    // What is cut between floors is one plane, so that two or three of each face some of the other.
+    let (linked, relayed) = pairs(&summary);
+    assert!(linked >= 5 && relayed == 0, "{summary}");
+}
+
 #[test]
 fn workers_that_cannot_reach_each_other_are_relayed() {
     let mut cluster = Cluster::start(BOLIDE, false);

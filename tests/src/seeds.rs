@@ -355,7 +355,7 @@ pub fn play(model: &Arc<Model>, options: &SessionOptions, seed: u64, plot: Plot)
 }
 
 fn spec(number: usize) -> WorkerSpec {
-    WorkerSpec { name: format!("host-{number}"), speed: 1.0 + (number % 3) as f64, threads: 1 }
+    WorkerSpec::new(format!("host-{number}"), 1.0 + (number % 3) as f64, 1)
 }
 
 impl Play {

@@ -228,7 +228,7 @@ pub fn solve_through(
         .speeds
         .iter()
         .enumerate()
-        .map(|(i, &speed)| WorkerSpec { name: format!("worker-{i}"), speed, threads: at_work.threads })
+        .map(|(i, &speed)| WorkerSpec::new(format!("worker-{i}"), speed, at_work.threads))
         .collect();
     let (job, first) = Job::new(Arc::clone(&model), &specs, at_work.options, at_work.resume)?;
     let mut keep = Keep {

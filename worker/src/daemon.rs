@@ -61,6 +61,8 @@ pub struct Options {
     pub master: String,
     /// Name of this host.
     pub name: String,
+    /// The region of the virtual machine that it is in; empty to name none.
+    pub region: String,
     /// Relative speed.
     pub speed: f64,
     pub threads: u32,
@@ -232,6 +234,7 @@ fn greeting(options: &Options) -> Hello {
         crate::random(),
     );
     hello.token.clone_from(&options.token);
+    hello.region.clone_from(&options.region);
     hello.proof = Some(mechanics::proof::of_this_machine());
     hello.memory = options.memory.or_else(system::memory::available).unwrap_or_default();
     // Each slot has ports of its own: the one that other workers call, and the one that is emulated.

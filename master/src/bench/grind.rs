@@ -172,7 +172,7 @@ struct Taken {
 }
 
 fn once(model: &Arc<Model>, threads: u32, lanes: Option<Width>) -> Result<Taken, String> {
-    let specs = [WorkerSpec { name: "bench".to_owned(), speed: 1.0, threads }];
+    let specs = [WorkerSpec::new("bench", 1.0, threads)];
     let lanes = lanes.map(|width| width.to_string());
     let asked = JobOptions { lanes, no_output: true, ..JobOptions::default() };
     let options = SessionOptions { asked, ..SessionOptions::default() };

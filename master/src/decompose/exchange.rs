@@ -7,8 +7,8 @@
 
 use mechanics::{mesh::Mesh, piece::Region};
 
-use super::{Subdomain, grids::Cells, seams::Seams};
-use crate::balance::Costs;
+use super::{Fleet, Subdomain, grids::Cells, seams::Seams};
+use crate::balance::{Costs, FAR_BYTE};
 
 /// Bytes of a frame beside its partial forces.
 const FRAME_BYTES: f64 = 64.0;
@@ -102,14 +102,15 @@ impl Exchange {
     }
 
     /// When each worker ends a cycle.
-    pub fn ends(&self, held: &[Held], speeds: &[f64], costs: Costs) -> Vec<f64> {
+    pub fn ends(&self, held: &[Held], fleet: Fleet<'_>, costs: Costs) -> Vec<f64> {
+        let speeds = fleet.speeds;
         let bytes_of = |nodes: f64| self.node_bytes.mul_add(nodes, FRAME_BYTES);
         let handling = |bytes: f64| costs.copy.mul_add(bytes, costs.message);
         let mut frames: Vec<Frame> = Vec::with_capacity(self.neighbours.iter().map(Vec::len).sum());
         // By worker: when it has handed over its frames, and what messages take of it.
         let mut sent: Vec<(f64, f64)> = Vec::with_capacity(speeds.len());
-        for (((others, border), held), speed) in
-            self.neighbours.iter().zip(&self.border).zip(held).zip(speeds)
+        for (worker, (((others, border), held), speed)) in
+            (0..).zip(self.neighbours.iter().zip(&self.border).zip(held).zip(speeds))
         {
             let border = overlapping(*border, held.elements) / speed;
             let (mut now, mut wire) = (border, 0.0_f64);
@@ -118,7 +119,9 @@ impl Exchange {
                 now += handling(bytes) / speed;
                 let leaves = wire.max(now);
                 wire = costs.byte.mul_add(bytes, leaves);
-                frames.push(Frame { to, enters: leaves + costs.travel, bytes });
+                let far =
+                    if fleet.are_near(worker, to as usize) { 0.0 } else { FAR_BYTE * costs.byte * bytes };
+                frames.push(Frame { to, enters: leaves + costs.travel + far, bytes });
             }
             // As many come in, of the same lengths.
             sent.push((now, 2.0 * (now - border)));

@@ -2,7 +2,7 @@
 
 use mechanics::piece::Region;
 
-use super::{Halves, fastest, total};
+use super::crew::Crew;
 
 /// Recursive bisection along index planes, of all boxes together. Where whole planes miss the share of the workers by more than `near`, the
 /// last plane is divided once more, so that the miss is at most half a column along the part's shortest axis. Of `axes` it
@@ -10,20 +10,19 @@ use super::{Halves, fastest, total};
 pub fn cut_planes(
     boxes: Vec<Cells>,
     (axes, shortest, near): (&[usize], usize, f64),
-    (workers, halves): (&[usize], Halves),
-    speeds: &[f64],
+    crew: Crew<'_>,
     count: &dyn Fn(&Cells) -> u64,
     out: &mut Vec<(Region, usize)>,
 ) {
     let volume: u64 = boxes.iter().map(count).sum();
-    if workers.len() == 1 || volume <= 1 {
-        let worker = fastest(workers, speeds);
+    if crew.workers.len() == 1 || volume <= 1 {
+        let worker = crew.fastest();
         out.extend(boxes.into_iter().map(|Cells { low, high }| (Region::Cells { low, high }, worker)));
         return;
     }
     let mut best: Option<(f64, Cut, usize)> = None;
-    for split in halves.of(workers, speeds) {
-        let target = volume as f64 * total(&workers[..split], speeds) / total(workers, speeds);
+    for split in crew.splits() {
+        let target = volume as f64 * crew.divided(split)[0].speed() / crew.speed();
         for &axis in axes {
             let Some(whole) = Cut::whole(&boxes, axis, target, count) else { continue };
             let interface = volume as f64 / whole.planes;
@@ -39,7 +38,7 @@ pub fn cut_planes(
         }
     }
     let Some((_, cut, split)) = best else {
-        let worker = fastest(workers, speeds);
+        let worker = crew.fastest();
         out.extend(boxes.into_iter().map(|Cells { low, high }| (Region::Cells { low, high }, worker)));
         return;
     };
@@ -61,8 +60,9 @@ pub fn cut_planes(
     }
     join(&mut below);
     join(&mut above);
-    cut_planes(below, (axes, shortest, near), (&workers[..split], halves), speeds, count, out);
-    cut_planes(above, (axes, shortest, near), (&workers[split..], halves), speeds, count, out);
+    let [first, others] = crew.divided(split);
+    cut_planes(below, (axes, shortest, near), first, count, out);
+    cut_planes(above, (axes, shortest, near), others, count, out);
 }
 
 /// Joins boxes that make up one, as those of a divided plane do on both sides once they are cut across it.

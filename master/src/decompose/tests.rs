@@ -2,6 +2,7 @@
 
 use super::*;
 use mechanics::mesh::Part;
+use std::collections::HashSet;
 
 const NODE: Costs = Costs { node: 0.1, ..Costs::NONE };
 
@@ -30,7 +31,8 @@ fn every_element_is_dealt_once() {
     for n in [1, 2, 3, 4, 7, 16, 200] {
         let speeds: Vec<f64> = (0..n).map(|i| 1.0 + (i % 4) as f64).collect();
         let mesh = plate([30, 30, 10]);
-        let total: usize = shares(&decompose(&mesh, &speeds, NODE, (None, true)), n).iter().sum();
+        let total: usize =
+            shares(&decompose(&mesh, Fleet::near(&speeds), NODE, (None, true)), n).iter().sum();
         assert_eq!(total, 9000, "{n} workers");
     }
 }
@@ -38,7 +40,7 @@ fn every_element_is_dealt_once() {
 #[test]
 fn shares_follow_speeds_within_one_index_plane() {
     let speeds = [1.0, 2.0, 0.5];
-    let count = shares(&decompose(&plate([30, 30, 20]), &speeds, NODE, (None, true)), 3);
+    let count = shares(&decompose(&plate([30, 30, 20]), Fleet::near(&speeds), NODE, (None, true)), 3);
     for (c, s) in count.iter().zip(speeds) {
         let ideal = 18_000.0 * s / 3.5;
         assert!((*c as f64 - ideal).abs() <= 600.0, "{count:?}: {c} against {ideal}");
@@ -47,7 +49,10 @@ fn shares_follow_speeds_within_one_index_plane() {
 
 #[test]
 fn equal_speeds_share_equally_where_planes_allow() {
-    assert_eq!(shares(&decompose(&plate([40, 40, 10]), &[1.0; 16], NODE, (None, true)), 16), vec![1000; 16]);
+    assert_eq!(
+        shares(&decompose(&plate([40, 40, 10]), Fleet::near(&[1.0; 16]), NODE, (None, true)), 16),
+        vec![1000; 16]
+    );
 }
 
 /// Sixteen hosts with speeds of 1 to 4, by a small generator.
@@ -83,7 +88,8 @@ fn a_mixed_lab_ends_near_the_bound() {
             let speeds = mixed_lab(seed);
             let bound = f64::from(n * n * n) / speeds.iter().sum::<f64>();
             let ratio =
-                slowest_finish(&decompose(&plate([n; 3]), &speeds, NODE, (None, true)), &speeds) / bound;
+                slowest_finish(&decompose(&plate([n; 3]), Fleet::near(&speeds), NODE, (None, true)), &speeds)
+                    / bound;
             (worst, sum) = (worst.max(ratio), sum + ratio);
             naive = naive.max(naive_slabs([n; 3], &speeds) / bound);
         }
@@ -104,7 +110,7 @@ fn facing_columns_of_thin_plates_fall_on_one_worker() {
     let mut both = plate([40, 40, thick[0]]);
     both.parts.extend(plate([40, 40, thick[1]]).parts);
     let mut owners = [vec![usize::MAX; 1600], vec![usize::MAX; 1600]];
-    for s in decompose(&both, &speeds, NODE, (None, true)) {
+    for s in decompose(&both, Fleet::near(&speeds), NODE, (None, true)) {
         let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
         assert_eq!((low[2], high[2]), (0, thick[s.part]), "the thin axis stays whole");
         for j in low[1]..high[1] {
@@ -118,7 +124,7 @@ fn facing_columns_of_thin_plates_fall_on_one_worker() {
 
 #[test]
 fn cuts_leave_the_thin_axis_whole() {
-    for s in decompose(&plate([30, 30, 10]), &[1.0; 4], NODE, (None, true)) {
+    for s in decompose(&plate([30, 30, 10]), Fleet::near(&[1.0; 4]), NODE, (None, true)) {
         let Region::Cells { low, high } = s.region else { panic!("a structured part gives cells") };
         assert_eq!((low[2], high[2]), (0, 10));
     }
@@ -134,7 +140,7 @@ fn where_messages_cost_much_columns_with_few_neighbours_are_cut() {
     let mesh = plate([100, 100, 75]);
     let most = |message| {
         let costs = Costs { message, ..NODE };
-        let subdomains = decompose(&mesh, &[1.0; 80], costs, (None, true));
+        let subdomains = decompose(&mesh, Fleet::near(&[1.0; 80]), costs, (None, true));
         let elements = shares(&subdomains, 80);
         assert_eq!(elements.iter().sum::<usize>(), 750_000);
         exchange(&mesh, &subdomains, 80).add_messages(vec![0.0; 80], 0.5).into_iter().fold(0.0, f64::max)
@@ -149,7 +155,7 @@ fn slow_wires_keep_blocks_with_few_shared_nodes() {
     let mesh = plate([100, 100, 75]);
     let shared = |byte| {
         let costs = Costs { message: 65.0, byte, ..NODE };
-        let subdomains = decompose(&mesh, &[1.0; 80], costs, (None, true));
+        let subdomains = decompose(&mesh, Fleet::near(&[1.0; 80]), costs, (None, true));
         exchange(&mesh, &subdomains, 80).copies().into_iter().fold(0.0, f64::max)
     };
     assert!(shared(0.17) < shared(0.0), "{} at 1 Gb/s, {} without a wire", shared(0.17), shared(0.0));
@@ -164,7 +170,7 @@ fn ends(pairs: &[[u32; 2]], speeds: &[f64], byte: f64) -> Vec<f64> {
     let shared = pairs.iter().map(|&workers| exchange::Shared { workers, nodes: 100.0, border: 0.0 });
     let exchange = Exchange::of(shared.collect(), speeds.len(), 24.0);
     let held = vec![Held { elements: 1000.0, nodes: 0.0 }; speeds.len()];
-    exchange.ends(&held, speeds, Costs { message: 10.0, travel: 50.0, byte, ..Costs::NONE })
+    exchange.ends(&held, Fleet::near(speeds), Costs { message: 10.0, travel: 50.0, byte, ..Costs::NONE })
 }
 
 #[test]
@@ -197,9 +203,10 @@ fn borders_overlap_the_more_the_more_of_the_elements_they_are() {
 fn workers_are_divided_where_both_sides_are_as_fast() {
     let speeds = [7.0, 7.0, 7.0, 1.9, 1.9, 0.77, 0.77, 0.77, 0.3];
     let order: Vec<usize> = (0..9).collect();
-    assert_eq!(Halves::Speed.of(&order, &speeds), [2, 2]);
-    assert_eq!(Halves::Speed.of(&order[2..], &speeds), [1, 1]);
-    assert_eq!(Halves::Count.of(&order, &speeds), [4, 5]);
+    let of = |workers, halves| Crew { fleet: Fleet::near(&speeds), workers, halves }.splits();
+    assert_eq!(of(&order, Halves::Speed), [2, 2]);
+    assert_eq!(of(&order[2..], Halves::Speed), [1, 1]);
+    assert_eq!(of(&order, Halves::Count), [4, 5]);
 }
 
 /// Two blocks of unit cells, the second above the first; they share the nodes of their seam or stand a little apart.
@@ -249,7 +256,7 @@ fn on_slow_wires_parts_that_touch_are_cut_so_that_facing_pieces_stay_together() 
     let mesh = stack([40, 40, 30], [40, 40, 10], false);
     let exchanged = |touch| {
         let costs = Costs { byte: 0.17, ..Costs::default() };
-        let subdomains = decompose(&mesh, &[1.0; 16], costs, (None, touch));
+        let subdomains = decompose(&mesh, Fleet::near(&[1.0; 16]), costs, (None, touch));
         Seams::new(&mesh, true).between(&subdomains).iter().map(|shared| shared.nodes).sum::<f64>()
     };
     assert!(exchanged(true) < 0.2 * exchanged(false), "{} of {}", exchanged(true), exchanged(false));
@@ -259,7 +266,7 @@ fn on_slow_wires_parts_that_touch_are_cut_so_that_facing_pieces_stay_together() 
 fn what_many_workers_hold_of_a_part_are_few_boxes_of_which_no_two_make_up_one() {
     let n = 150;
     let costs = Costs { byte: 0.017, ..Costs::default() };
-    let subdomains = decompose(&plate([100, 100, 40]), &vec![1.0; n], costs, (None, false));
+    let subdomains = decompose(&plate([100, 100, 40]), Fleet::near(&vec![1.0; n]), costs, (None, false));
     assert_eq!(shares(&subdomains, n).iter().sum::<usize>(), 400_000);
     let boxes: Vec<(usize, Cells)> = subdomains
         .iter()
@@ -273,4 +280,31 @@ fn what_many_workers_hold_of_a_part_are_few_boxes_of_which_no_two_make_up_one() 
         assert!(same.into_iter().all(|(_, other)| cells.with(other).is_none()), "worker {worker}");
     }
     assert!(boxes.len() <= 2 * n, "{} boxes", boxes.len());
+}
+
+/// Nodes of a plate of 40 x 30 x 4 cells that both of two regions hold.
+fn shared_by_regions(fleet: Fleet<'_>, regions: &[u32]) -> usize {
+    let subdomains = decompose(&plate([40, 30, 4]), fleet, Costs::default(), (None, false));
+    let mut nodes = [HashSet::new(), HashSet::new()];
+    for Subdomain { region, worker, .. } in &subdomains {
+        let Region::Cells { low, high } = region else { panic!("a structured part") };
+        for k in low[2]..=high[2] {
+            for j in low[1]..=high[1] {
+                nodes[regions[*worker] as usize].extend((low[0]..=high[0]).map(|i| [i, j, k]));
+            }
+        }
+    }
+    nodes[0].intersection(&nodes[1]).count()
+}
+
+#[test]
+fn parts_are_cut_between_regions_first_whatever_the_order_of_the_workers() {
+    let regions = [0, 1, 1, 0, 1, 0, 0, 1];
+    let near = shared_by_regions(Fleet::near(&[1.0; 8]), &regions);
+    let fleet = Fleet { speeds: &[1.0; 8], regions: &regions };
+    assert_eq!(shared_by_regions(fleet, &regions), 31 * 5, "one plane across the longest side");
+    assert!(near > 300, "{near}");
+    let order = Fleet { speeds: &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0], regions: &regions }.order(1);
+    assert_eq!(order, [6, 5, 3, 0, 7, 4, 2, 1]);
+    assert_eq!(super::regions(["b", "", "b", "a"].into_iter()), [0, 1, 0, 2]);
 }

@@ -14,7 +14,7 @@ use protocol::message::Work;
 
 use crate::{
     balance::Costs,
-    decompose::{Living, Subdomain, decompose, work},
+    decompose::{Fleet, Living, Subdomain, decompose, work},
     incident::Rebalance,
 };
 
@@ -70,6 +70,8 @@ impl Meter {
 pub(super) struct Shares {
     /// What work was dealt out by.
     pub(super) speeds: Vec<f64>,
+    /// Which of them are near each other, by number.
+    pub(super) regions: Vec<u32>,
     /// Elements, eroded ones aside.
     pub(super) elements: Vec<f64>,
     /// Which worker has which elements.
@@ -181,7 +183,12 @@ fn propose(medians: &[[f64; 2]], slowest: f64, shares: &Shares, ground: &Ground<
     if speeds == shares.speeds && held == shares.elements {
         return None;
     }
-    let layout = decompose(ground.mesh, &speeds, ground.costs, (ground.alive, ground.touch));
+    let layout = decompose(
+        ground.mesh,
+        Fleet { speeds: &speeds, regions: &shares.regions },
+        ground.costs,
+        (ground.alive, ground.touch),
+    );
     let elements = work(&layout, n, 0.0, &living);
     // Contact in elements, dealt out by speed.
     let truly: Vec<f64> = (0..n).map(|w| measured[w].unwrap_or(speeds[w] * usual)).collect();
@@ -208,9 +215,9 @@ mod tests {
     /// Two workers that were dealt `mesh` by equal speeds.
     fn shares(mesh: &Mesh) -> Shares {
         let speeds = vec![1.0, 1.0];
-        let layout = decompose(mesh, &speeds, Costs::NONE, (None, false));
+        let layout = decompose(mesh, Fleet::near(&speeds), Costs::NONE, (None, false));
         let elements = work(&layout, 2, 0.0, &Living::new(mesh, None));
-        Shares { speeds, elements, layout, held: Vec::new() }
+        Shares { speeds, elements, layout, held: Vec::new(), regions: Vec::new() }
     }
 
     #[test]

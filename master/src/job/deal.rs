@@ -33,7 +33,7 @@ use super::{
 };
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
-    decompose::{self, Living, decompose, held, work},
+    decompose::{self, Fleet, Living, decompose, held, work},
     event::{Action, Deal, WorkerSpec},
     exchange::Exchange,
     node_owners::NodeOwners,
@@ -135,7 +135,9 @@ impl Job {
         let costs = self.options.costs();
         let alive = alive_in(state);
         let touch = model.setup.contact.is_some();
-        let layout = decompose(&model.mesh, &speeds, costs, (alive.as_deref(), touch));
+        let regions = decompose::regions(specs.iter().map(|spec| &*spec.region));
+        let fleet = Fleet { speeds: &speeds, regions: &regions };
+        let layout = decompose(&model.mesh, fleet, costs, (alive.as_deref(), touch));
         if model.output.workers {
             let owners: Arc<[u32]> = decompose::owners(&model.mesh, &layout).into();
             actions.push(Action::Owners(Arc::clone(&owners)));
@@ -160,7 +162,7 @@ impl Job {
                     surface.unwrap_or_else(|| Arc::clone(&touching.surface)),
                     settings.clone(),
                     Arc::clone(&touching.exclusions),
-                    speeds.clone(),
+                    fleet,
                     self.options.route(),
                     self.options.dealing,
                     costs,
@@ -198,7 +200,7 @@ impl Job {
         let mut trees = Vec::new();
         if self.options.has_tree(n) {
             let cycle = elements.iter().sum::<f64>() / speeds.iter().sum::<f64>();
-            trees = tree::tree(&exchange.plans, &speeds, self.options.tree.neighbours, (cycle, costs));
+            trees = tree::tree(&exchange.plans, fleet, self.options.tree.neighbours, (cycle, costs));
             epoch.root = trees.iter().position(|place| place.parent.is_none());
         }
         let mut sortings = match (&basis, &model.setup.contact) {
@@ -263,7 +265,7 @@ impl Job {
         epoch.at_work = at_work;
         let mut held = vec![0; n];
         layout.iter().for_each(|place| held[place.worker] += place.region.n_elements() as u64);
-        epoch.shares = Shares { speeds, elements, layout, held };
+        epoch.shares = Shares { speeds, regions, elements, layout, held };
         Ok(epoch)
     }
 }

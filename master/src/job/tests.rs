@@ -34,7 +34,7 @@ pub(super) const DECK: &str = r#"
 "#;
 
 fn specs(n: usize) -> Vec<WorkerSpec> {
-    (0..n).map(|i| WorkerSpec { name: format!("worker-{i}"), speed: 1.0, threads: 1 }).collect()
+    (0..n).map(|i| WorkerSpec::new(format!("worker-{i}"), 1.0, 1)).collect()
 }
 
 pub(super) fn job(n: usize) -> (Job, Vec<Action>) {
@@ -196,7 +196,7 @@ fn waiting(n: usize) -> Job {
 fn a_job_without_workers_deals_itself_out_to_the_first_that_comes() {
     let mut job = waiting(2);
     assert!(!job.is_over() && job.at_work().is_empty());
-    let actions = job.apply(Event::Joined(WorkerSpec { name: "new".into(), speed: 1.0, threads: 1 }));
+    let actions = job.apply(Event::Joined(WorkerSpec::new("new", 1.0, 1)));
     assert_eq!(assigned(&actions), [(2, 3, 0)]);
 }
 

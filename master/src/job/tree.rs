@@ -7,13 +7,15 @@
 //! ([`Aboard`](protocol::message::Aboard)) if one of them has no children, and costs no message. So some workers become *hubs*, which
 //! have neighbours for children, and a tree of few levels joins the hubs. There each child costs its parent two messages in a cycle,
 //! and each level the way of a message up and down, which the lag of orders hides as long as a cycle is longer.
+//!
+//! Each region has a tree of its own; their roots are joined by one more. So one message of a cycle goes up and one down between two regions.
 
 use std::collections::VecDeque;
 
 use mechanics::cycle::Plan;
 use protocol::message::Tree;
 
-use crate::balance::Costs;
+use crate::{balance::Costs, decompose::Fleet};
 
 /// Most children of a hub of middle speed that are hubs.
 const MOST_CHILDREN: usize = 8;
@@ -24,18 +26,24 @@ const MOST_SPEED: f64 = 4.0;
 /// worker of speed 1.
 pub(super) fn tree(
     plans: &[Plan],
-    speeds: &[f64],
+    fleet: Fleet<'_>,
     neighbours: usize,
     (cycle, costs): (f64, Costs),
 ) -> Vec<Tree> {
+    let speeds = fleet.speeds;
     let mut sorted = speeds.to_vec();
     sorted.sort_by(f64::total_cmp);
     let middle = sorted[speeds.len() / 2];
     let relative: Vec<f64> = speeds.iter().map(|speed| (speed / middle).min(MOST_SPEED)).collect();
     let mut places = vec![Tree::default(); speeds.len()];
-    let hubs = join_neighbours(plans, &relative, neighbours, &mut places);
+    let hubs = join_neighbours((plans, fleet), &relative, neighbours, &mut places);
     let children = most_children(hubs.len(), cycle, costs);
-    join_hubs(hubs, &relative, children, &mut places);
+    let mut roots = Vec::new();
+    for region in by_region(hubs, fleet) {
+        roots.push(region[0]);
+        join_hubs(region, &relative, children, &mut places);
+    }
+    join_hubs(roots, &relative, children, &mut places);
     let is_leaf: Vec<bool> = places.iter().map(|place| place.children.is_empty()).collect();
     places
         .iter_mut()
@@ -44,17 +52,36 @@ pub(super) fn tree(
     places
 }
 
-/// Makes some workers parents of their neighbours, until every worker has a parent or is one; gives those, the fastest first.
-fn join_neighbours(plans: &[Plan], relative: &[f64], most: usize, places: &mut [Tree]) -> Vec<usize> {
+/// Hubs of one region after another, the region with the fastest first, and in each region the fastest first.
+fn by_region(hubs: Vec<usize>, fleet: Fleet<'_>) -> Vec<Vec<usize>> {
+    let mut regions: Vec<Vec<usize>> = Vec::new();
+    for hub in hubs {
+        match regions.iter_mut().find(|region| fleet.are_near(region[0], hub)) {
+            Some(region) => region.push(hub),
+            None => regions.push(vec![hub]),
+        }
+    }
+    regions
+}
+
+/// Makes some workers parents of neighbours in their region, until every worker has a parent or is one; gives those, the fastest first.
+fn join_neighbours(
+    (plans, fleet): (&[Plan], Fleet<'_>),
+    relative: &[f64],
+    most: usize,
+    places: &mut [Tree],
+) -> Vec<usize> {
     let n = plans.len();
     let mut is_free = vec![true; n];
     let mut hubs: Vec<usize> = Vec::new();
     let room = |worker: usize| (most as f64 * relative[worker]) as usize;
+    let neighbours = |worker: usize| {
+        let neighbours = plans[worker].neighbours.iter().map(|other| other.worker as usize);
+        neighbours.filter(move |&other| fleet.are_near(worker, other))
+    };
     while is_free.contains(&true) {
-        let free_neighbours = |worker: usize| {
-            let neighbours = plans[worker].neighbours.iter().map(|other| other.worker as usize);
-            neighbours.filter(|&other| is_free[other]).take(room(worker))
-        };
+        let free_neighbours =
+            |worker: usize| neighbours(worker).filter(|&other| is_free[other]).take(room(worker));
         // A slow worker is made one where nobody else will do.
         let gain = |worker: usize| (1.0 + free_neighbours(worker).count() as f64) * relative[worker].min(1.0);
         let candidates = (0..n).filter(|&worker| is_free[worker]);
@@ -65,8 +92,8 @@ fn join_neighbours(plans: &[Plan], relative: &[f64], most: usize, places: &mut [
         let children: Vec<usize> = free_neighbours(hub).collect();
         is_free[hub] = false;
         // The neighbours of the last ones belong to hubs, or are some.
-        let near = plans[hub].neighbours.iter().map(|other| other.worker as usize);
-        let near = near.filter(|other| hubs.contains(other) && places[*other].children.len() < room(*other));
+        let near = neighbours(hub)
+            .filter(|other| hubs.contains(other) && places[*other].children.len() < room(*other));
         if let (true, Some(parent)) =
             (children.is_empty(), near.min_by_key(|&other| places[other].children.len()))
         {
@@ -158,11 +185,29 @@ mod tests {
         for n in 1..70 {
             let speeds: Vec<f64> = (0..n).map(|w| [0.3, 7.0, 1.9, 0.77, 100.0][(w * w + n) % 5]).collect();
             for cycle in [0.0, 1e3, 1e6] {
-                assert!(depth(&tree(&row(n, 2), &speeds, 12, (cycle, COSTS))) <= 8, "{n} workers");
+                assert!(
+                    depth(&tree(&row(n, 2), Fleet::near(&speeds), 12, (cycle, COSTS))) <= 8,
+                    "{n} workers"
+                );
             }
         }
-        assert!(depth(&tree(&row(40, 0), &[1.0; 40], 12, (1e6, COSTS))) <= 6, "without neighbours");
-        assert!(depth(&tree(&row(1000, 3), &[1.0; 1000], 12, (1e4, COSTS))) <= 9);
+        assert!(
+            depth(&tree(&row(40, 0), Fleet::near(&[1.0; 40]), 12, (1e6, COSTS))) <= 6,
+            "without neighbours"
+        );
+        assert!(depth(&tree(&row(1000, 3), Fleet::near(&[1.0; 1000]), 12, (1e4, COSTS))) <= 9);
+    }
+
+    #[test]
+    fn between_regions_one_worker_of_each_talks_to_one_of_another() {
+        let speeds: Vec<f64> = (0..60).map(|w| [1.0, 3.0, 0.5][w % 3]).collect();
+        let regions: Vec<u32> = (0..60).map(|w| [2, 0, 1][w / 20]).collect();
+        let fleet = Fleet { speeds: &speeds, regions: &regions };
+        let places = tree(&row(60, 8), fleet, 12, (1e4, COSTS));
+        assert!(depth(&places) <= 6);
+        let parent = |worker: usize| places[worker].parent.map(|parent| parent as usize);
+        let across = (0..60).filter(|&w| parent(w).is_some_and(|parent| regions[parent] != regions[w]));
+        assert_eq!(across.count(), 2);
     }
 
     #[test]
@@ -174,7 +219,7 @@ mod tests {
     #[test]
     fn slow_workers_have_no_children_and_the_root_is_a_fast_one() {
         let speeds = [0.3, 7.0, 7.0, 7.0, 1.9, 1.9, 0.77, 0.77, 0.77];
-        let places = tree(&row(9, 8), &speeds, 12, (1e6, COSTS));
+        let places = tree(&row(9, 8), Fleet::near(&speeds), 12, (1e6, COSTS));
         assert!(places[0].children.is_empty());
         let root = places.iter().position(|place| place.parent.is_none());
         assert!(root.is_some_and(|root| speeds[root] == 7.0));
@@ -183,7 +228,7 @@ mod tests {
 
     #[test]
     fn nearly_all_workers_without_children_hang_on_a_neighbour_and_hubs_are_few() {
-        let places = tree(&row(64, 4), &[1.0; 64], 12, (1e6, COSTS));
+        let places = tree(&row(64, 4), Fleet::near(&[1.0; 64]), 12, (1e6, COSTS));
         let leaves = (0..64).filter(|&worker| places[worker].children.is_empty());
         let is_near =
             |&worker: &usize| places[worker].parent.is_some_and(|parent| parent.abs_diff(worker as u32) <= 4);

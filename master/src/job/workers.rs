@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     fn three() -> Workers {
-        let spec = |name: &str| WorkerSpec { name: name.to_owned(), speed: 1.0, threads: 1 };
+        let spec = |name: &str| WorkerSpec::new(name, 1.0, 1);
         Workers::new(&["a", "b", "c"].map(spec))
     }
 
@@ -211,8 +211,7 @@ mod tests {
             again.to_string(),
             "worker c, cycle 42: NaN; worker a failed at cycle 40 as well, so it is not the worker's fault"
         );
-        let alone =
-            Workers::new(&[WorkerSpec { name: "a".into(), speed: 1.0, threads: 1 }]).fail(0, 3, "NaN");
+        let alone = Workers::new(&[WorkerSpec::new("a", 1.0, 1)]).fail(0, 3, "NaN");
         assert_eq!(alone.map_err(|e| e.to_string()), Err("worker a, cycle 3: NaN".to_owned()));
     }
 }

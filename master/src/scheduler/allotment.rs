@@ -5,6 +5,8 @@
 //!
 //! - Each job has a *part* of the speeds: as much as it uses well ([`USED_WELL`]), else as much as the others. Owners
 //!   have equal parts, whatever they submit; a job of higher priority has its part before the others.
+//! - A job has workers of one region, because links between regions are slow; of another one too only if it needs more by its options or by
+//!   memory.
 //! - Jobs start in their order as long as each that runs keeps as many workers as it needs. One that starts takes what is idle, and
 //!   calls workers of jobs that have more than their part; these go at the next plan boundary of their job.
 //! - A job for which there are workers enough, but not beside those that run, has a *reservation*: jobs behind it start before it only if
@@ -16,7 +18,7 @@
 //! - A job on one worker of which it uses half of the threads at most leaves the others to a job that lacks a worker; idle threads go back to
 //!   the job on the same host, if they make it faster and nobody waits ([`slots`]).
 
-use std::time::Duration;
+use std::{collections::BTreeMap, time::Duration};
 
 use crate::{
     footprint::{self, Bearer},
@@ -65,6 +67,8 @@ pub struct Worker<'a> {
     pub process: u64,
     /// Whether it can give threads to another slot.
     pub divides: bool,
+    /// Of the workers with fast links to each other.
+    pub region: &'a str,
 }
 
 /// What a worker does.
@@ -244,7 +248,7 @@ struct Table<'a> {
     /// Those that run, then those that wait, in the order in which they are to start.
     rows: Vec<Row<'a>>,
     workers: Vec<Worker<'a>>,
-    /// Indices of workers that are idle and not given away, the fastest first.
+    /// Indices of workers that are idle and not given away: the region with most speed first, in each the fastest first.
     idle: Vec<usize>,
     available: Option<u64>,
     /// When the job with the reservation could begin (s).
@@ -275,7 +279,15 @@ impl<'a> Table<'a> {
         };
         let mut idle: Vec<usize> =
             (0..workers.len()).filter(|&w| workers[w].stands == Stands::Idle).collect();
-        idle.sort_by(|&a, &b| workers[b].bearer.speed.total_cmp(&workers[a].bearer.speed));
+        let speed = |worker: usize| workers[worker].bearer.speed;
+        let mut of_region: BTreeMap<&str, f64> = BTreeMap::new();
+        idle.iter()
+            .for_each(|&worker| *of_region.entry(workers[worker].region).or_default() += speed(worker));
+        idle.sort_by(|&a, &b| {
+            let [here, there] = [a, b].map(|worker| workers[worker].region);
+            let regions = of_region[there].total_cmp(&of_region[here]).then(here.cmp(there));
+            regions.then(speed(b).total_cmp(&speed(a)))
+        });
         let mut rows: Vec<Row<'_>> = in_order(claims).into_iter().map(row).collect();
         for row in rows.iter_mut().filter(|row| row.claim.runs) {
             let leaves = |w: &usize| matches!(workers[*w].stands, Stands::Called { from, .. } if from == row.claim.job);
@@ -294,6 +306,16 @@ impl<'a> Table<'a> {
 
     fn speed(&self, worker: usize) -> f64 {
         self.workers[worker].bearer.speed
+    }
+
+    fn are_near(&self, one: usize, other: usize) -> bool {
+        self.workers[one].region == self.workers[other].region
+    }
+
+    /// Whether a worker is in a region in which a job has others, or the job has none.
+    fn is_near(&self, row: usize, worker: usize) -> bool {
+        let mut others = self.rows[row].all().peekable();
+        others.peek().is_none() || others.any(|other| self.are_near(other, worker))
     }
 
     fn speed_of(&self, row: usize) -> f64 {
@@ -402,7 +424,8 @@ impl<'a> Table<'a> {
         left.sort_by_key(|&worker| !is_its(worker));
         let (mut picked, mut speed) = (Vec::new(), 0.0);
         left.retain(|&worker| {
-            let fits = picked.len() < most && speed + self.speed(worker) <= SLACK * part;
+            let is_near = picked.first().is_none_or(|&first| self.are_near(first, worker));
+            let fits = is_near && picked.len() < most && speed + self.speed(worker) <= SLACK * part;
             if fits {
                 picked.push(worker);
                 speed += self.speed(worker);

@@ -104,6 +104,7 @@ impl Scheduler {
             stands,
             process: host.nonce,
             divides: link.divides,
+            region: &link.spec.region,
         })
     }
 

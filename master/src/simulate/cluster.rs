@@ -13,7 +13,7 @@ use toml::de::DeTable;
 
 use super::{
     machines::{Change, What},
-    network::{Network, Wires},
+    network::{Between, Network, Regions, Wires},
 };
 
 /// Longest cluster file (bytes).
@@ -120,9 +120,10 @@ pub fn read(text: &str, file_name: &str) -> Result<Cluster, Vec<Fault>> {
 fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Cluster> {
     let file = Table::new(document, 0, "the cluster file".to_owned(), faults);
     let title = file.require("title", "a title in quotes").and_then(|v| v.text());
-    let speeds = read_hosts(&file, faults);
+    let (speeds, names) = read_hosts(&file, faults);
     let costs = read_costs(&file);
-    let network = read_network(&file);
+    let regions = read_regions(&file, names);
+    let network = read_network(&file).map(|network| Network { regions, ..network });
     let changes = read_changes(&file, speeds.len());
     let tables = read_tables(&file, speeds.len());
     file.finish();
@@ -141,11 +142,13 @@ fn read_document(document: &DeTable<'_>, faults: &Faults<'_>) -> Option<Cluster>
     })
 }
 
-fn read_hosts(file: &Table<'_>, faults: &Faults<'_>) -> Vec<f64> {
-    let mut speeds = Vec::new();
+/// Speed and region of each host.
+fn read_hosts(file: &Table<'_>, faults: &Faults<'_>) -> (Vec<f64>, Vec<String>) {
+    let (mut speeds, mut regions) = (Vec::new(), Vec::new());
     for host in file.tables("host", MAX_ENTRIES) {
         let count = host.integer_or("count", 1, 1, MAX_HOSTS) as usize;
         let speed = host.number_or("speed", 1.0, Range::Positive);
+        let region = host.get("region").and_then(|value| value.text()).unwrap_or_default();
         let at = host.at;
         host.finish();
         if speeds.len() + count > MAX_HOSTS as usize {
@@ -158,11 +161,27 @@ fn read_hosts(file: &Table<'_>, faults: &Faults<'_>) -> Vec<f64> {
             break;
         }
         speeds.extend(std::iter::repeat_n(speed, count));
+        regions.extend(std::iter::repeat_n(region.to_owned(), count));
     }
     if speeds.is_empty() {
         faults.add(0, "no [[host]]", "at least one", "add [[host]]");
     }
-    speeds
+    (speeds, regions)
+}
+
+/// What is between regions, whose names are those of hosts.
+fn read_regions(file: &Table<'_>, of_host: Vec<String>) -> Regions {
+    let Some(value) = file.get("between") else { return Regions { of_host, between: None } };
+    if of_host.iter().all(|name| *name == of_host[0]) {
+        value.fault("hosts of two regions at least", "give [[host]] a region");
+    }
+    let between = value.table("[between]".to_owned()).and_then(|table| {
+        let rate = table.number("rate_bits_per_second", Range::Positive);
+        let latency = table.number("latency_seconds", Range::NotNegative);
+        table.finish();
+        Some(Between { rate: rate?, latency: latency? })
+    });
+    Regions { of_host, between }
 }
 
 /// The element's cost, then node, pair, search and sort.
@@ -206,6 +225,7 @@ fn read_network(file: &Table<'_>) -> Option<Network> {
         overhead,
         message: message?,
         byte: byte?,
+        regions: Regions::default(),
     })
 }
 
@@ -293,6 +313,18 @@ mod tests {
         assert_eq!(cluster.network.wires, Wires::Hub);
         assert_eq!(cluster.element, ElementCost::Seconds(1e-3));
         assert_eq!(cluster.tables, None);
+    }
+
+    #[test]
+    fn regions_are_those_that_hosts_name() {
+        let two = GOOD.replace("count = 2", "count = 2\nregion = \"lab\"\n[[host]]\nregion = \"office\"");
+        let between = "[between]\nrate_bits_per_second = 1e8\nlatency_seconds = 1e-3\n";
+        let Network { regions, .. } =
+            read(&format!("{two}{between}"), "good.toml").expect("two regions").network;
+        assert_eq!(regions.of_host, ["lab", "lab", "office"]);
+        assert_eq!(regions.between, Some(Between { rate: 1e8, latency: 1e-3 }));
+        let faults = read(&format!("{GOOD}{between}"), "bad.toml").expect_err("all hosts are near");
+        assert_eq!((faults.len(), faults[0].line), (1, 16), "{faults:?}");
     }
 
     #[test]

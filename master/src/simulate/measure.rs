@@ -22,7 +22,7 @@ use worker::compute::ThreadClock;
 
 use super::{
     machines::{Costs, Machines, Scheme},
-    network::{Network, Wires},
+    network::{Network, Regions, Wires},
     timeline::Kind,
     virtual_clock,
 };
@@ -93,6 +93,7 @@ pub fn once(model: &Arc<Model>, hosts: usize, lanes: Option<Width>) -> Result<Me
             overhead: 0,
             message: 0.0,
             byte: 0.0,
+            regions: Regions::default(),
         },
         changes: Vec::new(),
         dealt_by: crate::balance::Costs::NONE,

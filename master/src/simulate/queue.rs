@@ -294,6 +294,7 @@ impl Course<'_> {
             stands,
             process: index as u64,
             divides: false,
+            region: "",
         };
         let workers: Vec<Worker<'_>> = self.stands.iter().enumerate().map(worker).collect();
         let Arrangement { starts, joins, calls, stores, reserved, .. } = policy(&claims, &workers);

@@ -214,8 +214,13 @@ impl Timeline {
 
     /// Mean bytes between hosts in a cycle of the window.
     pub fn bytes_per_cycle(&self) -> f64 {
+        self.bytes_between(|_, _| true)
+    }
+
+    /// Mean bytes in a cycle of the window between hosts that are `apart`.
+    pub fn bytes_between(&self, apart: impl Fn(usize, usize) -> bool) -> f64 {
         let window = self.window();
-        let sent = self.flights.iter().filter(|f| window.contains(&f.cycle));
+        let sent = self.flights.iter().filter(|f| window.contains(&f.cycle) && apart(f.hosts.0, f.hosts.1));
         sent.map(|f| f.bytes).sum::<u64>() as f64 / (window.end - window.start).max(1) as f64
     }
 

@@ -173,7 +173,8 @@ fn nodes_of_sort(outcome: &session::Outcome) -> usize {
 
 /// A host as the job sees it.
 fn spec(machines: &Machines, host: usize) -> WorkerSpec {
-    WorkerSpec { name: format!("host-{}", host + 1), speed: machines.believed[host], threads: 1 }
+    let region = machines.network.regions.of_host.get(host).cloned().unwrap_or_default();
+    WorkerSpec { region, ..WorkerSpec::new(format!("host-{}", host + 1), machines.believed[host], 1) }
 }
 
 /// The machine of an end: the master is on the first.
@@ -182,6 +183,11 @@ fn host_of(end: End) -> usize {
         End::Master => 0,
         End::Host(host) => host,
     }
+}
+
+/// Those at both ends of a message.
+fn hosts_of(parcel: &Parcel) -> (usize, usize) {
+    (host_of(parcel.from), host_of(parcel.to))
 }
 
 impl World<Clock<'_>> {
@@ -205,9 +211,9 @@ impl World<Clock<'_>> {
             clock.now = time;
             match what {
                 What::Processor(..) => {}
-                What::Enters(sent) => {
-                    let arrival = clock.traffic.enter(time, host_of(sent.parcel.to), sent.parcel.bytes);
-                    clock.at(arrival, What::Arrives(sent));
+                What::Enters(sent, way) => {
+                    let stage = clock.traffic.enter(way, hosts_of(&sent.parcel), sent.parcel.bytes);
+                    clock.follow(sent, stage);
                 }
                 What::Arrives(sent) => clock.take_in(&self.sessions, sent),
                 What::Timer => self.apply(Event::Timer)?,
@@ -391,9 +397,15 @@ impl Clock<'_> {
         if host_of(sent.parcel.to) == host || self.is_free(&sent) {
             return self.take_in(sessions, sent);
         }
-        match self.traffic.leave(self.now, host, sent.parcel.bytes) {
+        let stage = self.traffic.leave(self.now, hosts_of(&sent.parcel), sent.parcel.bytes);
+        self.follow(sent, stage);
+    }
+
+    /// A message on its way is somewhere next.
+    fn follow(&mut self, sent: Sent, stage: Stage) {
+        match stage {
             Stage::Arrives(time) => self.at(time, What::Arrives(sent)),
-            Stage::Enters(time) => self.at(time, What::Enters(sent)),
+            Stage::Enters(way) => self.at(way.first, What::Enters(sent, way)),
         }
     }
 
@@ -402,8 +414,8 @@ impl Clock<'_> {
         if !self.stands(&sent) {
             return;
         }
-        let Parcel { from, to, bytes, .. } = sent.parcel;
-        let hosts = (host_of(from), host_of(to));
+        let Parcel { to, bytes, .. } = sent.parcel;
+        let hosts = hosts_of(&sent.parcel);
         if hosts.0 != hosts.1 {
             let (message, cycle, time) = (sent.number, sent.cycle, (sent.at, self.now));
             self.timeline.flights.push(Flight { message, hosts, cycle, bytes, time });

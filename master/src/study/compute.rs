@@ -65,7 +65,7 @@ pub fn compute(model: Model, folder: &Path, threads: usize, stop: &AtomicBool) -
     let machine = |why: String| Error::Machine(why);
     let results = |why: crate::results::Error| Error::Machine(why.to_string());
     let model = Arc::new(quiet(model));
-    let spec = WorkerSpec { name: "worker-0".to_owned(), speed: 1.0, threads: threads as u32 };
+    let spec = WorkerSpec::new("worker-0", 1.0, threads as u32);
     let interval = Interval { seconds: Some(STORED_EVERY), cycles: None };
     let asked = JobOptions::default();
     let options = SessionOptions {

@@ -146,7 +146,7 @@ fn a_worker_that_joins_is_used_from_the_next_boundary_and_changes_no_bit() {
         let (at, lost_at) = (draw(arrivals / 4), draw(arrivals / 4));
         let route = [Route::Master, Route::Direct][draw(2) as usize];
         let mut fate = |number: u64| match number {
-            n if n == at => Some(Fate::Join(WorkerSpec { name: "late".into(), speed: 2.0, threads: 1 })),
+            n if n == at => Some(Fate::Join(WorkerSpec::new("late", 2.0, 1))),
             n if n == lost_at && seed % 2 == 0 => Some(Fate::Lose(0)),
             _ => None,
         };
@@ -162,7 +162,7 @@ fn a_worker_that_joins_is_used_from_the_next_boundary_and_changes_no_bit() {
 #[test]
 fn with_no_worker_left_a_job_that_waits_goes_on_with_the_next_and_another_ends() {
     let (one, written, arrivals) = undisturbed();
-    let spec = || WorkerSpec { name: "late".into(), speed: 1.0, threads: 1 };
+    let spec = || WorkerSpec::new("late", 1.0, 1);
     for seed in 0..8 {
         let at = 100 + random(seed)(arrivals / 2);
         let mut fate = |number: u64| match number.checked_sub(at) {

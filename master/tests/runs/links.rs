@@ -66,7 +66,7 @@ fn model(text: &str, cycles: u64) -> Arc<Model> {
 }
 
 fn specs(n: usize) -> Vec<WorkerSpec> {
-    (0..n).map(|i| WorkerSpec { name: format!("worker-{i}"), speed: 1.0 + i as f64, threads: 1 }).collect()
+    (0..n).map(|i| WorkerSpec::new(format!("worker-{i}"), 1.0 + i as f64, 1)).collect()
 }
 
 fn digest(outcome: &Outcome) -> String {

@@ -72,7 +72,7 @@ fn one_unit_in_the_last_place_of_one_worker_is_found_by_name_and_leaves_no_trace
             // One joins as well: the run is dealt out anew from a state that nobody has proved yet.
             let mut fate = |number: u64| match number.checked_sub(at) {
                 Some(0) => Some(Fate::Touch(1, Machine::plant_fault)),
-                Some(25) => Some(Fate::Join(WorkerSpec { name: "late".into(), speed: 1.0, threads: 1 })),
+                Some(25) => Some(Fate::Join(WorkerSpec::new("late", 1.0, 1))),
                 _ => None,
             };
             let solved = run(at_work(3, true, route), &mut fate).unwrap_or_else(|e| panic!("at {at}: {e}"));

@@ -17,7 +17,7 @@ use master::{
         calibrate,
         cluster::{self, Cluster},
         machines::{Change, Costs, Machines, Scheme, What},
-        network::{Network, Wires},
+        network::{Between, Network, Regions, Wires},
         paper::{self, Verdict},
         sweep, table,
         timeline::{Kind, Span, Timeline},
@@ -54,6 +54,7 @@ fn machines(n: usize) -> Machines {
             overhead: 0,
             message: 0.0,
             byte: 0.0,
+            regions: Regions::default(),
         },
         changes: Vec::new(),
         dealt_by: balance::Costs::NONE,
@@ -148,7 +149,7 @@ impl Sink for Nowhere {
 }
 
 fn embedded_digest(model: &Arc<Model>) -> String {
-    let spec = WorkerSpec { name: "worker".into(), speed: 1.0, threads: 1 };
+    let spec = WorkerSpec::new("worker", 1.0, 1);
     let (job, first) =
         Job::new(Arc::clone(model), &[spec], SessionOptions::default(), None).expect("the deck starts");
     let (outcome, _) =
@@ -191,6 +192,29 @@ fn a_row_does_not_depend_on_the_rates_that_stand_before_it() {
     let alone = rows(&[10e9]);
     assert_eq!(alone.len(), 4);
     assert_eq!(rows(&[1e9, 10e9]), alone);
+}
+
+#[test]
+fn few_bytes_pass_between_regions_that_hosts_name_and_the_digest_stands() {
+    let model = model("plates-free-slip.toml", 16);
+    let run = |regions: Regions| {
+        let mut eight = machines(8);
+        eight.costs = Costs { element: 1e-6, pair: 1e-6, ..Costs::default() };
+        (eight.network.rate, eight.network.message, eight.network.latency) = (1e9, 1e-6, 1e-5);
+        eight.network.regions = regions;
+        run(&model, &dealt_by_its_costs(eight), Scheme::bolide(Route::Direct))
+    };
+    let apart = |from: usize, to: usize| from % 2 != to % 2;
+    let of_host: Vec<String> = (0..8).map(|host| ["lab", "office"][host % 2].to_owned()).collect();
+    let near = run(Regions::default());
+    let named = run(Regions { of_host: of_host.clone(), between: None });
+    let between = Some(Between { rate: 1e8, latency: 1e-4 });
+    let far = run(Regions { of_host, between });
+    let bytes = [&near, &named, &far].map(|timeline| timeline.bytes_between(apart));
+    assert!(2.0 * bytes[1] < bytes[0] && bytes[1] > 0.0, "{bytes:?}");
+    assert_eq!(bytes[2], bytes[1], "wires change no message");
+    assert!(far.seconds_per_cycle() > named.seconds_per_cycle());
+    assert_eq!([&named.digest, &far.digest], [&near.digest; 2]);
 }
 
 #[test]
@@ -452,13 +476,9 @@ fn half_a_bar_erodes() -> Model {
 #[test]
 fn elements_lost_to_erosion_are_followed_within_two_boundaries() {
     let model = Arc::new(half_a_bar_erodes());
-    let (job, first) = Job::new(
-        Arc::clone(&model),
-        &[WorkerSpec { name: "worker".into(), speed: 1.0, threads: 1 }],
-        SessionOptions::default(),
-        None,
-    )
-    .expect("the deck starts");
+    let (job, first) =
+        Job::new(Arc::clone(&model), &[WorkerSpec::new("worker", 1.0, 1)], SessionOptions::default(), None)
+            .expect("the deck starts");
     let (outcome, _) =
         embedded::run(job, first, 1, 1, &mut Nowhere, &AtomicBool::new(false)).expect("the deck runs");
     let state = outcome.state.expect("the worker gives it");

@@ -203,7 +203,7 @@ fn contact_surface_carries_the_force_of_the_history_as_pressure_where_bodies_tou
     assert!(hits > 10, "{row:?}");
     deck.setup.control.end_cycle = 60;
     let solved = run(deck);
-    let spec = WorkerSpec { name: "one".into(), speed: 1.0, threads: 1 };
+    let spec = WorkerSpec::new("one", 1.0, 1);
     let (job, _) = Job::new(Arc::clone(&solved.model), &[spec], without_states(JobOptions::default()), None)
         .expect("it has run");
     let probe = job.probe().expect("there is contact");

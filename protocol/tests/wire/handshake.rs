@@ -39,7 +39,7 @@ fn greeting_has_its_golden_bytes() {
     let (_, frame) = Client::new(&hello()).expect("a good greeting");
     #[rustfmt::skip]
     let golden = [
-        19, 0,                                           // version
+        20, 0,                                           // version
         0, 0, 0, 0,                                      // worker
         4, 0, 0, 0, 0, 0, 0, 0, b'p', b'c', b'-', b'1',  // name
         0, 0, 0, 0, 0, 0, 0xf8, 0x3f,                    // speed 1.5
@@ -52,6 +52,7 @@ fn greeting_has_its_golden_bytes() {
         0,                                               // no proof
         0, 0, 0, 0, 0, 0, 0, 0,                          // does not say what memory it has
         0,                                               // does not divide
+        0, 0, 0, 0, 0, 0, 0, 0,                          // names no region
         0,                                               // stays on TCP
     ];
     assert_eq!(frame.payload, golden);
@@ -112,6 +113,9 @@ fn greetings_with_bad_values_are_refused_with_both_values() {
     let shown = &long[..64];
     assert_eq!(refused(|hello| hello.name = long.clone()), format!("name {shown:?} of 65 bytes, {rule}"));
     assert!(refused(|hello| hello.lanes = "../..".into()).starts_with("lanes \"../..\" of 5 bytes"));
+    assert!(
+        refused(|hello| hello.region = "two floors".into()).starts_with("region \"two floors\" of 10 bytes")
+    );
     assert_eq!(refused(|hello| hello.threads = 0), "0 threads, must be 1 to 4096");
     assert_eq!(refused(|hello| hello.threads = 4097), "4097 threads, must be 1 to 4096");
     let long = || Some("x".repeat(129));
@@ -125,7 +129,7 @@ fn frames_that_are_no_greeting_are_refused() {
     let (_, mut frame) = Client::new(&hello()).expect("a good greeting");
     frame.payload.push(0);
     let reason = refusal(policy(), &frame);
-    assert_eq!(reason, "hello: message of 65 bytes in a payload of 66");
+    assert_eq!(reason, "hello: message of 73 bytes in a payload of 74");
     for length in 0..frame.payload.len() - 1 {
         let cut = Frame::new(frame.header, frame.payload[..length].to_vec());
         assert!(refusal(policy(), &cut).starts_with("hello: control message: "), "{length} bytes");

@@ -49,7 +49,7 @@ pub(super) const DECK: &str = r#"
 const WORKERS: usize = 2;
 
 pub(super) fn job(model: &Arc<deck::Model>) -> (Job, Vec<Action>) {
-    let spec = |i: usize| WorkerSpec { name: format!("host-{i}"), speed: 1.0, threads: 1 };
+    let spec = |i: usize| WorkerSpec::new(format!("host-{i}"), 1.0, 1);
     let specs: Vec<WorkerSpec> = (0..WORKERS).map(spec).collect();
     let keep = CheckpointEvery::Cycles(3);
     let options = without_states(JobOptions { route: Some(Route::Master), ..JobOptions::default() });

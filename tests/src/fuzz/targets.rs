@@ -414,7 +414,7 @@ impl Target for Snapshots {
             return false;
         }
         let Ok(stored) = snapshot::read(&path) else { return false };
-        let specs = [WorkerSpec { name: "host".into(), speed: 1.0, threads: 1 }];
+        let specs = [WorkerSpec::new("host", 1.0, 1)];
         Job::new(Arc::clone(&self.model), &specs, without_states(JobOptions::default()), Some(stored)).is_ok()
     }
 }

@@ -56,7 +56,8 @@ impl Table<'_> {
         let of = |fits: &dyn Fn(usize, f64) -> bool, fastest: bool| {
             from.iter().find_map(|&row| {
                 let has = self.rows[row].has.iter().copied();
-                let fitting = has.filter(|&worker| fits(row, self.speed(worker)) && goes_on(row, worker));
+                let near = has.filter(|&worker| must || self.is_near(to, worker));
+                let fitting = near.filter(|&worker| fits(row, self.speed(worker)) && goes_on(row, worker));
                 let by_speed = |a: &usize, b: &usize| self.speed(*a).total_cmp(&self.speed(*b));
                 let best = if fastest { fitting.max_by(by_speed) } else { fitting.min_by(by_speed) };
                 best.map(|worker| (row, worker))

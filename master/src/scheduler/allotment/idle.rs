@@ -80,6 +80,7 @@ impl Table<'_> {
             // One whose workers are all lost waits for any.
             && (n == 0 || !self.rows[row].ends_soon())
             && n < claim.workers[1]
+            && self.is_near(row, worker)
             && self.shortage(claim, self.rows[row].all().chain([worker])).is_none()
     }
 

@@ -36,6 +36,7 @@ fn workers(speeds: &[f64], stands: &[Stands]) -> Vec<Worker<'static>> {
         stands: stands.get(i).copied().unwrap_or(Stands::Idle),
         process: i as u64,
         divides: false,
+        region: "",
     };
     (0..speeds.len()).map(of).collect()
 }
@@ -87,6 +88,23 @@ fn jobs_share_by_what_they_can_use_and_then_equally() {
     assert_eq!(small.starts, [(1, vec![1]), (2, vec![2, 3])], "what neither can use stays idle");
     let most = Claim { workers: [1, 2], ..job(1, 1_000_000) };
     assert_eq!(arranged(&[most], &five).starts, [(1, vec![1, 2])]);
+}
+
+#[test]
+fn a_job_has_workers_of_one_region_unless_it_needs_more() {
+    let mut six = workers(&[2.0, 1.0, 3.0, 1.0, 1.0, 1.0], &[]);
+    for (worker, region) in six.iter_mut().zip(["a", "b", "a", "b", "b", "b"]) {
+        worker.region = region;
+    }
+    let some = |most| Claim { workers: [1, most], ..job(1, 1_000_000) };
+    assert_eq!(arranged(&[some(2)], &six).starts, [(1, vec![3, 1])]);
+    assert_eq!(arranged(&[some(6)], &six).starts, [(1, vec![3, 1])], "none of the other");
+    six[5].bearer.speed = 3.0;
+    assert_eq!(arranged(&[some(3)], &six).starts, [(1, vec![6, 2, 4])], "the region with most speed");
+    let needs = Claim { workers: [5, 6], ..job(1, 1_000_000) };
+    assert_eq!(arranged(&[needs], &six).starts[0].1.len(), 6, "of both where one has not enough");
+    let two = [job(1, 1_000_000), job(2, 1_000_000)];
+    assert_eq!(arranged(&two, &six).starts, [(1, vec![6, 2, 4, 5]), (2, vec![3, 1])]);
 }
 
 #[test]
@@ -388,6 +406,7 @@ fn slots(of: &[(u64, u32, Stands)]) -> Vec<Worker<'static>> {
         stands,
         process,
         divides: true,
+        region: "",
     };
     of.iter().enumerate().map(slot).collect()
 }

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use worker::session::Outcome;
 
+use super::super::network::Way;
 use super::super::timeline::Kind;
 use crate::{sort::Sorted, world::Parcel};
 
@@ -40,8 +41,8 @@ pub struct Begun(pub f64, pub Work);
 pub enum What {
     /// A processor may have ended something, if nothing changed since this version.
     Processor(usize, u64),
-    /// The first bits of a message reach the receiver's port.
-    Enters(Sent),
+    /// The first bits of a message reach a port on its way.
+    Enters(Sent, Way),
     /// All of a message is there.
     Arrives(Sent),
     /// The time that the job asked for has passed.
