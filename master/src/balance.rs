@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 
-use mechanics::contact::WorkUnit;
+use mechanics::contact::{Surface, WorkUnit};
 
 use crate::decompose::Fleet;
 
@@ -146,90 +146,190 @@ pub fn assign_to_owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usi
     owners(units, n, owner).into_iter().map(|(worker, _)| worker).collect()
 }
 
+/// Surface nodes that a unit needs, ascending.
+type Nodes<'a> = dyn Fn(&WorkUnit) -> Vec<u32> + 'a;
+
 /// Worker of each unit. `weights` are the units' pairs; `work` is what the workers' sub-domains cost (element-cycles); `owner` gives the
-/// worker that owns a surface node's elements. A worker that finishes late by less than the messages of two new neighbours keeps its units,
-/// and it gives them to those with which it exchanges nodes in any case, unless another one would finish earlier by more than these messages.
-/// A unit leaves the region of its owner only if that gains more than the bytes of all units that do take between two regions.
+/// worker that owns a surface node's elements, and `nodes` those that a unit needs ([`nodes_of`]). A worker that finishes late by less than the
+/// messages of two new neighbours keeps its units. Messages of workers that exchanged no node before count on both sides. A unit leaves the
+/// region of its owner only if that gains more than the bytes of all units that do take between two regions.
 pub fn assign(
     units: &[WorkUnit],
     (weights, costs): (&[u64], Costs),
     fleet: Fleet<'_>,
     work: &[f64],
-    owner: &dyn Fn(u32) -> usize,
+    (owner, nodes): (&dyn Fn(u32) -> usize, &Nodes<'_>),
 ) -> Vec<usize> {
     let speeds = fleet.speeds;
     let n = speeds.len();
     if n == 1 {
         return vec![0; units.len()];
     }
-    let Costs { pair, message, .. } = costs;
-    let (mut chosen, bound): (Vec<usize>, Vec<usize>) = owners(units, n, owner).into_iter().unzip();
+    let (chosen, bound): (Vec<usize>, Vec<usize>) = owners(units, n, owner).into_iter().unzip();
     let mut load = vec![0_u64; n];
     for (weight, &worker) in weights.iter().zip(&chosen) {
         load[worker] += weight;
     }
-    let level = level(speeds, work, pair * load.iter().sum::<u64>() as f64);
-    let limit = |w: usize| level.mul_add(1.0 + TOLERANCE, NEIGHBOUR * message / speeds[w]);
-    let finish = |w: usize, load: u64| pair.mul_add(load as f64, work[w]) / speeds[w];
-    let is_late = |u: &usize| weights[*u] > 0 && finish(chosen[*u], load[chosen[*u]]) > limit(chosen[*u]);
+    let level = level(speeds, work, costs.pair * load.iter().sum::<u64>() as f64);
+    let (work, known, holders) = (work.to_vec(), Vec::new(), Vec::new());
+    let mut dealer = Dealer { costs, fleet, work, load, chosen, known, holders, level, between: 0.0 };
+    let is_late = |u: &usize| weights[*u] > 0 && dealer.is_late(dealer.chosen[*u]);
     let mut giving: Vec<usize> = (0..units.len()).filter(is_late).collect();
     if giving.is_empty() {
-        return chosen;
+        return dealer.chosen;
     }
-    let mut known = if message > 0.0 { met(units, &chosen, n, owner) } else { Vec::new() };
     // Loosely bound units first, the heavier of equals first: fewer moves.
     giving.sort_by_key(|&u| (bound[u], std::cmp::Reverse(weights[u]), u));
-    // What units that have left their region take between two.
-    let mut between = 0.0;
-    for u in giving {
-        let (from, weight) = (chosen[u], weights[u]);
-        let before = finish(from, load[from]);
-        if before <= limit(from) {
-            continue;
-        }
-        let far = FAR_BYTE * costs.byte * NODE_BYTES * units[u].nodes.len() as f64;
-        let after = |w: usize| {
-            let is_new = message > 0.0 && w != from && !known[from].contains(&w);
-            let new = if is_new { NEIGHBOUR * message / speeds[w] } else { 0.0 };
-            finish(w, load[w] + weight) + new + if fleet.are_near(from, w) { 0.0 } else { between + far }
-        };
-        let to = (0..n).fold(0, |best, w| if after(w) < after(best) { w } else { best });
-        if to != from && after(to) < before {
-            load[from] -= weight;
-            load[to] += weight;
-            chosen[u] = to;
-            between += if fleet.are_near(from, to) { 0.0 } else { far };
-            if message > 0.0 {
-                known[from].insert(to);
-                known[to].insert(from);
+    if costs.message > 0.0 {
+        dealer.meet(units, owner, nodes);
+    }
+    giving.iter().for_each(|&u| dealer.give(u, weights[u], &nodes(&units[u]), false));
+    // Then to workers that the giver has not met, each of which takes many: those first that few hold.
+    if costs.message > 0.0 {
+        giving.iter().rev().for_each(|&u| dealer.give(u, weights[u], &nodes(&units[u]), true));
+    }
+    dealer.chosen
+}
+
+/// Surface nodes whose positions a unit needs and on which it puts forces, ascending: its own and those of its faces.
+pub fn nodes_of(unit: &WorkUnit, surface: &Surface) -> Vec<u32> {
+    let of_faces = unit.faces.iter().flat_map(|&face| surface.faces[face as usize].nodes);
+    let mut nodes: Vec<u32> = unit.nodes.iter().copied().chain(of_faces).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+/// Units on their way to workers that have room.
+struct Dealer<'a> {
+    costs: Costs,
+    fleet: Fleet<'a>,
+    /// By worker: element-cycles of its sub-domains and of messages to those that it has met.
+    work: Vec<f64>,
+    /// By worker: pairs of its units.
+    load: Vec<u64>,
+    /// Worker of each unit.
+    chosen: Vec<usize>,
+    /// By worker: those with which it exchanges nodes of units. None where messages cost nothing, as below.
+    known: Vec<BTreeSet<usize>>,
+    /// By surface node: its owner and workers that have units with it. Each sends all others what it adds to the force on the node.
+    holders: Vec<Vec<usize>>,
+    /// When all would have ended at best.
+    level: f64,
+    /// Element-cycles that units which have left their region take between two.
+    between: f64,
+}
+
+impl Dealer<'_> {
+    fn finish(&self, worker: usize, load: u64) -> f64 {
+        self.costs.pair.mul_add(load as f64, self.work[worker]) / self.fleet.speeds[worker]
+    }
+
+    /// What a neighbour more costs a worker.
+    fn meeting(&self, worker: usize) -> f64 {
+        NEIGHBOUR * self.costs.message / self.fleet.speeds[worker]
+    }
+
+    /// Whether a worker ends later than the others by more than it costs to give units away.
+    fn is_late(&self, worker: usize) -> bool {
+        let limit = self.level.mul_add(1.0 + TOLERANCE, 2.0 * self.meeting(worker));
+        self.finish(worker, self.load[worker]) > limit
+    }
+
+    /// Workers that hold nodes of units meet.
+    fn meet(&mut self, units: &[WorkUnit], owner: &dyn Fn(u32) -> usize, nodes: &Nodes<'_>) {
+        self.known = vec![BTreeSet::new(); self.load.len()];
+        for (unit, &worker) in units.iter().zip(&self.chosen).filter(|(unit, _)| !unit.is_empty()) {
+            let nodes = nodes(unit);
+            let n = nodes.last().map_or(0, |&last| last as usize + 1);
+            self.holders.resize(self.holders.len().max(n), Vec::new());
+            for node in nodes {
+                let holders = &mut self.holders[node as usize];
+                for holder in [owner(node), worker] {
+                    if !holders.contains(&holder) {
+                        for &other in &*holders {
+                            self.known[holder].insert(other);
+                            self.known[other].insert(holder);
+                        }
+                        holders.push(holder);
+                    }
+                }
             }
         }
     }
-    chosen
-}
 
-/// Messages that a worker sends and receives in a cycle for two more neighbours: the owner of a unit's elements, and another one.
-const NEIGHBOUR: f64 = 4.0;
+    /// Workers that hold any of these nodes, ascending.
+    fn holders_of(&self, nodes: &[u32]) -> Vec<usize> {
+        let holders = |&node: &u32| self.holders.get(node as usize).into_iter().flatten().copied();
+        let mut all: Vec<usize> = nodes.iter().flat_map(holders).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
 
-/// By worker: those that own nodes of its units.
-fn met(units: &[WorkUnit], chosen: &[usize], n: usize, owner: &dyn Fn(u32) -> usize) -> Vec<BTreeSet<usize>> {
-    let mut met = vec![BTreeSet::new(); n];
-    for (unit, &worker) in units.iter().zip(chosen) {
-        let mut last = worker;
-        for other in unit.nodes.iter().map(|&node| owner(node)) {
-            if other != last && other != worker {
-                met[worker].insert(other);
-                met[other].insert(worker);
+    fn has_met(&self, one: usize, other: usize) -> bool {
+        one == other || self.known[one].contains(&other)
+    }
+
+    /// Gives a unit of so many pairs, and with these nodes, to the worker that ends it first, if its own is late; where messages cost, if that
+    /// one is by half as much at most. Workers meet only if they `may`, and if the giver is late by more than that costs on both sides.
+    fn give(&mut self, u: usize, weight: u64, nodes: &[u32], may_meet: bool) {
+        let from = self.chosen[u];
+        if !self.is_late(from) {
+            return;
+        }
+        let before = self.finish(from, self.load[from]);
+        let late = before - self.level;
+        let far = FAR_BYTE * self.costs.byte * NODE_BYTES * nodes.len() as f64;
+        let holders = self.holders_of(nodes);
+        // What costs messages has to gain as much again.
+        let enough = if self.costs.message > 0.0 { self.level + 0.5 * late } else { before };
+        let (mut best, mut to) = (enough, from);
+        for other in (0..self.load.len()).filter(|&other| other != from) {
+            let way = if self.fleet.are_near(from, other) { 0.0 } else { self.between + far };
+            let computed = self.finish(other, self.load[other] + weight) + way;
+            if computed < best {
+                let new = holders.iter().filter(|&&holder| !self.has_met(other, holder)).count() as f64;
+                let after = new.mul_add(self.meeting(other), computed);
+                let pays = new == 0.0 || may_meet && late > new * (self.meeting(from) + self.meeting(other));
+                (best, to) = if pays && after < best { (after, other) } else { (best, to) };
             }
-            last = other;
+        }
+        if to == from {
+            return;
+        }
+        self.load[from] -= weight;
+        self.load[to] += weight;
+        self.chosen[u] = to;
+        self.between += if self.fleet.are_near(from, to) { 0.0 } else { far };
+        for holder in holders {
+            if !self.has_met(to, holder) {
+                for (one, other) in [(to, holder), (holder, to)] {
+                    self.work[one] += NEIGHBOUR * self.costs.message;
+                    self.known[one].insert(other);
+                }
+            }
+        }
+        for &node in nodes {
+            if let Some(holders) = self.holders.get_mut(node as usize)
+                && !holders.contains(&to)
+            {
+                holders.push(to);
+            }
         }
     }
-    met
 }
+
+/// Messages that a worker sends and receives in a cycle for a neighbour more.
+const NEIGHBOUR: f64 = 2.0;
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn own(unit: &WorkUnit) -> Vec<u32> {
+        unit.nodes.clone()
+    }
 
     const PAIRS: Costs = Costs { pair: 1.2, ..Costs::NONE };
 
@@ -242,7 +342,7 @@ mod tests {
         let units: Vec<_> = (0..8).map(|i| unit(i, vec![i as u32], 10)).collect();
         let owner = |n: u32| (n % 2) as usize;
         assert_eq!(
-            assign(&units, (&[10; 8], PAIRS), Fleet::near(&[1.0, 1.0]), &[1e4; 2], &owner),
+            assign(&units, (&[10; 8], PAIRS), Fleet::near(&[1.0, 1.0]), &[1e4; 2], (&owner, &own)),
             [0, 1, 0, 1, 0, 1, 0, 1]
         );
     }
@@ -258,8 +358,13 @@ mod tests {
     fn an_overloaded_worker_gives_units_until_shares_follow_speeds() {
         let units: Vec<_> = (0..400).map(|i| unit(i, vec![i as u32], 10)).collect();
         let speeds = [1.0, 2.0, 1.0];
-        let chosen =
-            assign(&units, (&[10; 400], PAIRS), Fleet::near(&speeds), &[500.0, 1000.0, 500.0], &|_| 0);
+        let chosen = assign(
+            &units,
+            (&[10; 400], PAIRS),
+            Fleet::near(&speeds),
+            &[500.0, 1000.0, 500.0],
+            (&|_| 0, &own),
+        );
         for (w, s) in speeds.iter().enumerate() {
             let load = chosen.iter().filter(|&&c| c == w).count() as f64;
             let share = 100.0 * s;
@@ -271,7 +376,8 @@ mod tests {
     fn contact_levels_what_index_planes_left_uneven() {
         assert!((level(&[1.0, 1.0, 2.0], &[100.0, 110.0, 220.0], 40.0) - 117.5).abs() < 1e-9);
         let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 1)).collect();
-        let chosen = assign(&units, (&[1; 100], PAIRS), Fleet::near(&[1.0, 1.0]), &[1000.0, 1060.0], &|_| 1);
+        let chosen =
+            assign(&units, (&[1; 100], PAIRS), Fleet::near(&[1.0, 1.0]), &[1000.0, 1060.0], (&|_| 1, &own));
         let first = chosen.iter().filter(|&&w| w == 0).count();
         // 120 elements' worth of pairs: 90 to the first, 30 to the other.
         assert!((70..=76).contains(&first), "{first}");
@@ -282,7 +388,7 @@ mod tests {
         assert_eq!(level(&[1.0, 1.0], &[100.0, 110.0], 8.0), 108.0);
         let units: Vec<_> = (0..6).map(|i| unit(i, vec![i as u32], 1)).collect();
         assert_eq!(
-            assign(&units, (&[1; 6], PAIRS), Fleet::near(&[1.0, 1.0]), &[100.0, 110.0], &|_| 1),
+            assign(&units, (&[1; 6], PAIRS), Fleet::near(&[1.0, 1.0]), &[100.0, 110.0], (&|_| 1, &own)),
             [0; 6]
         );
     }
@@ -303,7 +409,7 @@ mod tests {
         let receivers = |message: f64, first: f64| {
             let costs = Costs { message, ..PAIRS };
             let work: Vec<f64> = (0..20).map(|w| if w == 0 { first } else { 5000.0 }).collect();
-            let chosen = assign(&units, (&[10; 400], costs), Fleet::near(&[1.0; 20]), &work, &owner);
+            let chosen = assign(&units, (&[10; 400], costs), Fleet::near(&[1.0; 20]), &work, (&owner, &own));
             chosen.into_iter().filter(|&w| w != 0).collect::<BTreeSet<_>>().len()
         };
         assert_eq!(receivers(0.0, 5000.0), 19, "all share what costs no message");
@@ -319,7 +425,7 @@ mod tests {
         let chosen = |byte: f64| {
             let costs = Costs { byte, ..PAIRS };
             let fleet = Fleet { speeds: &[1.0; 4], regions: &[0, 0, 1, 1] };
-            let chosen = assign(&units, (&[10; 100], costs), fleet, &[1e3; 4], &|_| 0);
+            let chosen = assign(&units, (&[10; 100], costs), fleet, &[1e3; 4], (&|_| 0, &own));
             [0, 1, 2, 3].map(|worker| chosen.iter().filter(|&&w| w == worker).count())
         };
         assert_eq!(chosen(0.0), [25; 4]);
@@ -330,5 +436,21 @@ mod tests {
             "{:?}",
             [one, other, two, three]
         );
+    }
+
+    #[test]
+    fn a_unit_stays_where_it_is_if_many_hold_the_nodes_of_its_faces() {
+        let owner = |node: u32| node as usize / 100;
+        let units: Vec<_> = (0..50).map(|i| unit(i, vec![i as u32], 10)).collect();
+        let costs = Costs { message: 65.0, ..PAIRS };
+        let given = |nodes: &Nodes<'_>| {
+            let work = [1000.0, 400.0, 1600.0, 1600.0, 1600.0, 1600.0];
+            let chosen = assign(&units, (&[10; 50], costs), Fleet::near(&[1.0; 6]), &work, (&owner, nodes));
+            chosen.into_iter().filter(|&worker| worker == 1).count()
+        };
+        assert!(given(&own) > 10, "{}", given(&own));
+        // Each of four others owns a node of a face.
+        let of_faces = |unit: &WorkUnit| vec![unit.nodes[0], 200, 300, 400, 500];
+        assert_eq!(given(&of_faces), 0);
     }
 }

@@ -1,27 +1,31 @@
 //! Decomposition: which worker holds which part of the Lagrange grids, in proportion to speeds.
 //!
 //! Every part is cut among all workers, with the same grouping of workers for all parts, so that facing columns of
-//! neighbouring parts fall on one worker. Structured parts are cut along index planes ([`grids`], paper section 3), explicit
-//! ones by recursive coordinate bisection. Columns and slabs that are cut along two axes or one share nodes with fewer others than blocks
-//! do, which pays where messages cost more than nodes and wires are fast. The best of several groupings and sets of axes wins, by the
-//! slowest finish of elements, nodes and the exchange of partial forces ([`exchange`]). Elements that have eroded cost nothing
-//! ([`Living`]); they are dealt out all the same, since their state is still held.
+//! neighbouring parts fall on one worker; or each part has workers of its own, which then have few neighbours. Structured parts are cut
+//! along index planes ([`grids`], paper section 3), explicit ones by recursive coordinate bisection. Columns and slabs that are cut along two
+//! axes or one share nodes with fewer others than blocks do, and rows of bricks with fewer than grids, which pays where messages cost more than
+//! nodes and wires are fast. The best of several groupings and shapes wins, by the slowest finish of elements, nodes and the exchange of
+//! partial forces ([`exchange`]). Elements that have eroded cost nothing ([`Living`]); they are dealt out all the same, since their state is
+//! still held.
 
 mod crew;
 mod exchange;
 mod grids;
 mod seams;
 
+use std::mem::discriminant;
+
 use mechanics::{
     mesh::{Mesh, Topology},
     piece::Region,
+    setup::Setup,
 };
 
 use crate::balance::Costs;
 use crew::{Crew, Halves};
 pub use crew::{Fleet, regions};
 use exchange::{Exchange, Held};
-use grids::{AXES, Cells, NEARS, cut_planes};
+use grids::{Cells, Cutting, NEARS, SHAPES, Shape};
 use seams::Seams;
 
 /// A sub-domain: a region of a part on a worker.
@@ -51,63 +55,118 @@ const TRIED: usize = 2000;
 /// A cut that ends so many times later than the best is not corrected where wires are what workers wait for.
 const NEAR: f64 = 1.15;
 
-/// A set of axes that ended so many times later than the best is not tried with further groupings.
+/// A shape that ended so many times later than the best is not tried with further groupings.
 const FAR: f64 = 1.5;
 
-/// Workers wait for wires if they end so many times later than their work alone takes. A correction by the ends has to gain as much, as the
-/// estimate knows a wire less well than work.
+/// Workers wait for wires if they end so many times later than their work alone takes.
 const WAITS: f64 = 1.03;
 
-/// A way to cut: the order of the workers, where they are divided, the axes to cut along, and how near to their share whole planes have to come.
-type How<'a> = (&'a [usize], Halves, &'a [usize], f64);
+/// A correction by the ends has to gain so much, as the estimate knows a wire less well than work: of workers of one speed, and of several.
+const GAINS: [f64; 2] = [1.01, 1.03];
+
+/// Of the elements of a worker or of a part, the lesser: a worker has no piece of a part that is less.
+const LEAST_PIECE: f64 = 0.05;
+
+/// What decides where a problem may be cut, beside its mesh.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Traits<'a> {
+    /// By global index: elements that cost anything; all do where it is none.
+    pub alive: Option<&'a [bool]>,
+    /// Structured parts that face each other exchange forces of contact.
+    pub touch: bool,
+    /// An element of any part takes as long as one of any other.
+    pub alike: bool,
+}
+
+impl<'a> Traits<'a> {
+    /// Of a problem of which these elements are alive.
+    pub fn of(mesh: &Mesh, setup: &Setup, alive: Option<&'a [bool]>) -> Self {
+        let kind = |part: &mechanics::mesh::Part| {
+            let material = &setup.materials[part.material as usize];
+            let laws = (discriminant(&material.eos), discriminant(&material.strength));
+            (laws, discriminant(&material.failure), discriminant(&part.hourglass.kind))
+        };
+        let are_alike = mesh.parts.windows(2).all(|two| kind(&two[0]) == kind(&two[1]));
+        let alike = are_alike && setup.bodies.is_empty() && setup.switches.is_empty();
+        Self { alive, touch: setup.contact.is_some(), alike }
+    }
+}
+
+/// A way to cut.
+#[derive(Clone, Copy)]
+struct How<'a> {
+    /// The order of the workers.
+    order: &'a [usize],
+    /// Where it is divided.
+    halves: Halves,
+    way: Way,
+}
+
+/// How structured parts are cut.
+#[derive(Clone, Copy)]
+struct Way {
+    shape: Shape,
+    /// How near to their share whole planes have to come.
+    near: f64,
+    /// Whether each part has workers of its own.
+    apart: bool,
+}
 
 /// Cuts the mesh for these workers. Sub-domains come part by part, shells first; those without elements are left
-/// out, so a worker may have none in a small problem. `alive` says by global index which elements cost anything; all do
-/// where it is none. Structured parts that face each other exchange forces of contact if they `touch`.
-pub fn decompose(
-    mesh: &Mesh,
-    fleet: Fleet<'_>,
-    costs: Costs,
-    (alive, touch): (Option<&[bool]>, bool),
-) -> Vec<Subdomain> {
+/// out, so a worker may have none in a small problem.
+pub fn decompose(mesh: &Mesh, fleet: Fleet<'_>, costs: Costs, traits: Traits<'_>) -> Vec<Subdomain> {
     let speeds = fleet.speeds;
     let n = speeds.len();
     let equal = speeds.iter().all(|s| *s == speeds[0]);
     let is_structured = |part: &mechanics::mesh::Part| matches!(part.topology, Topology::Structured { .. });
     let has_choice = n > 1 && costs.message > 0.0 && mesh.parts.iter().any(is_structured);
-    let choices = if has_choice { AXES } else { &AXES[..1] };
+    let shapes = if has_choice { SHAPES } else { &SHAPES[..1] };
+    let may_be_apart = has_choice
+        && traits.alike
+        && !traits.touch
+        && mesh.parts.len() > 1
+        && mesh.parts.iter().all(is_structured);
     let (groupings, by_work) = if n < 3 || equal { (1, 0) } else { (GROUPINGS.min(2 + TRIED / n), BY_WORK) };
     // Contact is dealt out by work, so those that got fewer elements would get it, and with it more ghosts.
-    let by_ends = if has_choice && !touch { BY_ENDS.min(TRIED / n) } else { 0 };
+    let by_ends = if has_choice && !traits.touch { BY_ENDS.min(TRIED / n) } else { 0 };
     let mut search = Search {
         mesh,
         fleet,
         costs,
-        living: Living::new(mesh, alive),
-        seams: if has_choice { Seams::new(mesh, touch) } else { Seams::default() },
+        living: Living::new(mesh, traits.alive),
+        seams: if has_choice { Seams::new(mesh, traits.touch) } else { Seams::default() },
         best: None,
     };
+    // Each way, and what it came to at the best.
+    let with = |apart: bool| shapes.iter().map(move |&shape| Way { shape, near: NEARS[0], apart });
+    let mut ways: Vec<(Way, f64)> = with(false).map(|way| (way, f64::INFINITY)).collect();
+    if may_be_apart {
+        ways.extend(with(true).map(|way| (way, f64::INFINITY)));
+    }
     let first = fleet.order(0);
-    let mut near = NEARS[0];
     if has_choice {
-        let mut least = f64::INFINITY;
-        for tried in NEARS {
-            let end = |axes: &&[usize]| search.cut((&first, Halves::Count, axes, tried), (0, 0));
-            let end = choices.iter().map(end).fold(f64::INFINITY, f64::min);
-            if end < least {
-                (least, near) = (end, tried);
+        for (way, ended) in &mut ways {
+            for near in NEARS {
+                let end = search
+                    .cut(How { order: &first, halves: Halves::Count, way: Way { near, ..*way } }, (0, 0));
+                if end < *ended {
+                    (way.near, *ended) = (near, end);
+                }
+                if end > FAR * search.least() {
+                    break;
+                }
             }
         }
     }
-    // What each set of axes came to at the best.
-    let mut ended = vec![f64::INFINITY; choices.len()];
     let by_count = (0..groupings).map(|seed| (seed, Halves::Count));
     let by_speed = (0..groupings.min(BY_SPEED)).filter(|_| !equal).map(|seed| (seed, Halves::Speed));
     for (seed, halves) in by_count.chain(by_speed) {
         let order = fleet.order(seed as u64);
-        for (axes, ended) in choices.iter().zip(&mut ended) {
-            if !(ended.is_finite() && *ended > FAR * search.least()) {
-                *ended = ended.min(search.cut((&order, halves, axes, near), (by_work, by_ends)));
+        for (way, ended) in &mut ways {
+            let is_divided = halves == Halves::Count || matches!(way.shape, Shape::Halves(_));
+            if is_divided && !(ended.is_finite() && *ended > FAR * search.least()) {
+                let how = How { order: &order, halves, way: *way };
+                *ended = ended.min(search.cut(how, (by_work, by_ends)));
             }
         }
     }
@@ -140,13 +199,13 @@ impl Search<'_> {
         let mut ended = f64::INFINITY;
         let mut shares = speeds.to_vec();
         for correction in 0..=by_work + by_ends {
-            let subdomains = cut_all(mesh, fleet.with(&shares), how, &self.living);
+            let subdomains = cut_all(mesh, fleet, &shares, how, &self.living);
             let held = held_by(&subdomains, n, &self.living);
             let work: Vec<f64> = held.iter().map(|held| held.work(costs.node)).collect();
             let computed: Vec<f64> = work.iter().zip(speeds).map(|(work, speed)| work / speed).collect();
             let least = self.least();
             // An equal finish keeps the earlier grouping, and the first is the order the user gave.
-            let gain = if correction > by_work { WAITS } else { 1.0 + 1e-9 };
+            let gain = if correction > by_work { GAINS[usize::from(by_work > 0)] } else { 1.0 + 1e-9 };
             let is_better = |ends: &[f64]| last(ends) * gain < least;
             let ends = if costs.message > 0.0 && is_better(&computed) {
                 Exchange::new(mesh, &subdomains, n, &self.seams).ends(&held, fleet, costs)
@@ -305,6 +364,17 @@ impl Living {
         }
     }
 
+    /// Living elements of each part of structured ones; of a part without any, one.
+    fn of_parts(&self, mesh: &Mesh) -> Vec<f64> {
+        let of_part = |(part, of): (usize, &mechanics::mesh::Part)| match of.topology {
+            Topology::Structured { cells } => {
+                self.in_box(part, &Cells { low: [0; 3], high: cells }).max(1) as f64
+            }
+            _ => of.n_elements().max(1) as f64,
+        };
+        mesh.parts.iter().enumerate().map(of_part).collect()
+    }
+
     fn in_box(&self, part: usize, cells: &Cells) -> u64 {
         let Some(Part::Below(below, [row, rows])) = &self.parts[part] else { return cells.volume() };
         let (low, high) = (cells.low.map(|n| n as usize), cells.high.map(|n| n as usize));
@@ -335,24 +405,56 @@ pub fn slowest_finish(subdomains: &[Subdomain], speeds: &[f64]) -> f64 {
     cost.iter().zip(speeds).map(|(c, s)| c / s).fold(0.0, f64::max)
 }
 
-fn cut_all(
-    mesh: &Mesh,
-    fleet: Fleet<'_>,
-    (workers, halves, axes, near): How<'_>,
-    living: &Living,
-) -> Vec<Subdomain> {
-    let crew = Crew { fleet, workers, halves };
+/// Workers that have a part for themselves, and their shares of it by index of the worker.
+struct Own {
+    workers: Vec<usize>,
+    shares: Vec<f64>,
+}
+
+/// Deals parts of so many elements out to workers in their order and by their speeds: those at the end of one have a piece of the next one too.
+/// What each has of a part is changed as `shares` are from speeds.
+fn own(sizes: &[f64], crew: Crew<'_>, shares: &[f64]) -> Vec<Own> {
+    let speeds = crew.fleet.speeds;
+    let by_speed = sizes.iter().sum::<f64>() / crew.speed();
+    let mut end = 0.0;
+    let of_part = |size: &f64| {
+        let begin = end;
+        end += size;
+        let mut own = Own { workers: Vec::new(), shares: vec![0.0; speeds.len()] };
+        let mut at = 0.0;
+        for &worker in crew.workers {
+            let all = by_speed * speeds[worker];
+            let common = (at + all).min(end) - at.max(begin);
+            if common > LEAST_PIECE * all.min(*size) {
+                own.workers.push(worker);
+                own.shares[worker] = common * shares[worker] / speeds[worker];
+            }
+            at += all;
+        }
+        own
+    };
+    sizes.iter().map(of_part).collect()
+}
+
+fn cut_all(mesh: &Mesh, fleet: Fleet<'_>, shares: &[f64], how: How<'_>, living: &Living) -> Vec<Subdomain> {
+    let How { order, halves, way: Way { shape, near, apart } } = how;
+    let all = Crew { fleet: fleet.with(shares), workers: order, halves };
+    let owns = if apart { own(&living.of_parts(mesh), Crew { fleet, ..all }, shares) } else { Vec::new() };
     let mut out = Vec::new();
     for (part, mesh_part) in mesh.parts.iter().enumerate() {
+        let crew = owns.get(part).map_or(all, |own| Crew {
+            fleet: fleet.with(&own.shares),
+            workers: &own.workers,
+            halves,
+        });
         let mut pieces = Vec::new();
         match &mesh_part.topology {
             Topology::Structured { cells } => {
-                let all = Cells { low: [0; 3], high: *cells };
+                let whole = Cells { low: [0; 3], high: *cells };
                 let shortest = (0..3).fold(2, |best, a| if cells[a] < cells[best] { a } else { best });
-                if all.volume() > 0 {
+                if whole.volume() > 0 {
                     let count = |cells: &Cells| living.in_box(part, cells);
-                    let along = (axes, shortest, near);
-                    cut_planes(vec![all], along, crew, &count, &mut pieces);
+                    Cutting { shape, shortest, near, count: &count }.cut(vec![whole], crew, &mut pieces);
                 }
             }
             Topology::Explicit { .. }

@@ -163,8 +163,9 @@ impl Sorter {
         let worker_of = match self.dealing {
             Dealing::Owners => {
                 let weights = contact::cull(&mut units, &self.surface, x, &self.settings, &self.exclusions);
+                let nodes = |unit: &contact::WorkUnit| balance::nodes_of(unit, &self.surface);
                 let fleet = Fleet { speeds: &self.speeds, regions: &self.regions };
-                balance::assign(&units, (&weights, self.costs), fleet, &node_owners.work, &owner)
+                balance::assign(&units, (&weights, self.costs), fleet, &node_owners.work, (&owner, &nodes))
             }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
         };

@@ -49,7 +49,7 @@ impl<'a> Fleet<'a> {
         self.region(one) == self.region(other)
     }
 
-    fn region(&self, worker: usize) -> u32 {
+    pub fn region(&self, worker: usize) -> u32 {
         self.regions.get(worker).copied().unwrap_or(0)
     }
 }
@@ -95,6 +95,16 @@ impl<'a> Crew<'a> {
         let speeds = self.fleet.speeds;
         let faster = |best, worker: usize| if speeds[worker] > speeds[best] { worker } else { best };
         self.workers.iter().copied().fold(self.workers[0], faster)
+    }
+
+    /// Whether all are in one region.
+    pub fn is_near(&self) -> bool {
+        self.workers.windows(2).all(|two| self.fleet.are_near(two[0], two[1]))
+    }
+
+    /// How much of the speed of all the first so many have.
+    pub fn share(&self, first: usize) -> f64 {
+        self.divided(first)[0].speed() / self.speed()
     }
 
     /// How many workers are on the first side: two choices, which may be one. Regions are divided from each other before their workers are.

@@ -2,8 +2,10 @@
 //!
 //! Every worker computes its border elements and sends each neighbour a frame, in the order of the workers. A frame costs the processors at
 //! both ends, occupies the wire out of the sender, travels, and occupies the wire into the receiver. Interior elements
-//! are computed beside all that. A worker integrates when it has computed all elements and taken in all frames. It is what
+//! are computed beside all that. A worker integrates when it has computed all elements and taken in all frames, and its vote leaves after its frames. It is what
 //! [`crate::simulate::virtual_clock`] charges, for one cycle that all begin at once.
+
+use std::collections::BTreeMap;
 
 use mechanics::{mesh::Mesh, piece::Region};
 
@@ -30,13 +32,16 @@ impl Held {
     }
 }
 
+/// Elements at a border: across I, J and K, and on a seam. Those across different axes are the same where a border has its edges.
+pub type Border = [f64; 4];
+
 /// What two workers share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shared {
     pub workers: [u32; 2],
     pub nodes: f64,
     /// Elements of each that touch the other's.
-    pub border: f64,
+    pub border: Border,
 }
 
 /// What workers share in structured parts.
@@ -44,13 +49,14 @@ pub struct Exchange {
     /// By worker, ascending: others and how many nodes it shares with them.
     neighbours: Vec<Vec<(u32, f64)>>,
     /// By worker: elements that touch the nodes that it shares.
-    border: Vec<f64>,
+    border: Vec<Border>,
     /// Bytes that a shared node takes in a frame.
     node_bytes: f64,
 }
 
 /// A frame on its way.
 struct Frame {
+    from: u32,
     to: u32,
     /// When its first bits reach the wire into the receiver.
     enters: f64,
@@ -74,13 +80,15 @@ impl Exchange {
         shared.iter_mut().for_each(|pair| pair.workers.sort_unstable());
         shared.sort_by_key(|pair| pair.workers);
         let mut neighbours: Vec<Vec<(u32, f64)>> = vec![Vec::new(); n];
-        let mut border = vec![0.0; n];
+        let mut border = vec![Border::default(); n];
         for same in shared.chunk_by(|a, b| a.workers == b.workers) {
             let nodes = same.iter().map(|pair| pair.nodes).sum();
             let [one, other] = same[0].workers;
             for (worker, other) in [(one, other), (other, one)] {
                 neighbours[worker as usize].push((other, nodes));
-                border[worker as usize] += same.iter().map(|pair| pair.border).sum::<f64>();
+                for (axis, elements) in same.iter().flat_map(|pair| pair.border.into_iter().enumerate()) {
+                    border[worker as usize][axis] += elements;
+                }
             }
         }
         neighbours.iter_mut().for_each(|others| others.sort_unstable_by_key(|(other, _)| *other));
@@ -95,6 +103,12 @@ impl Exchange {
         work
     }
 
+    /// How many others share nodes with each worker.
+    #[cfg(test)]
+    pub fn neighbours(&self) -> Vec<usize> {
+        self.neighbours.iter().map(Vec::len).collect()
+    }
+
     /// Copies of its nodes that others hold, by worker.
     #[cfg(test)]
     pub fn copies(&self) -> Vec<f64> {
@@ -107,8 +121,8 @@ impl Exchange {
         let bytes_of = |nodes: f64| self.node_bytes.mul_add(nodes, FRAME_BYTES);
         let handling = |bytes: f64| costs.copy.mul_add(bytes, costs.message);
         let mut frames: Vec<Frame> = Vec::with_capacity(self.neighbours.iter().map(Vec::len).sum());
-        // By worker: when it has handed over its frames, and what messages take of it.
-        let mut sent: Vec<(f64, f64)> = Vec::with_capacity(speeds.len());
+        // By worker: when it has handed over its frames and when they have left, and what messages take of it.
+        let mut sent: Vec<(f64, f64, f64)> = Vec::with_capacity(speeds.len());
         for (worker, (((others, border), held), speed)) in
             (0..).zip(self.neighbours.iter().zip(&self.border).zip(held).zip(speeds))
         {
@@ -119,31 +133,47 @@ impl Exchange {
                 now += handling(bytes) / speed;
                 let leaves = wire.max(now);
                 wire = costs.byte.mul_add(bytes, leaves);
-                let far =
-                    if fleet.are_near(worker, to as usize) { 0.0 } else { FAR_BYTE * costs.byte * bytes };
-                frames.push(Frame { to, enters: leaves + costs.travel + far, bytes });
+                frames.push(Frame { from: worker, to, enters: leaves + costs.travel, bytes });
             }
             // As many come in, of the same lengths.
-            sent.push((now, 2.0 * (now - border)));
+            sent.push((now, wire, 2.0 * (now - border)));
         }
+        pass_between_regions(&mut frames, fleet, costs);
         frames.sort_by(|a, b| a.to.cmp(&b.to).then(a.enters.total_cmp(&b.enters)));
         let mut frames = frames.into_iter().peekable();
         let mut ends = Vec::with_capacity(speeds.len());
-        for (worker, ((held, speed), (sent, messages))) in (0..).zip(held.iter().zip(speeds).zip(sent)) {
+        for (worker, ((held, speed), (sent, left, messages))) in (0..).zip(held.iter().zip(speeds).zip(sent))
+        {
             let (mut wire, mut done) = (0.0_f64, sent);
             while let Some(Frame { enters, bytes, .. }) = frames.next_if(|frame| frame.to == worker) {
                 wire = costs.byte.mul_add(bytes, wire.max(enters));
                 done = done.max(wire) + handling(bytes) / speed;
             }
-            ends.push(done.max(held.elements / speed + messages) + costs.node * held.nodes / speed);
+            let integrated = done.max(held.elements / speed + messages) + costs.node * held.nodes / speed;
+            // Its vote queues behind its frames.
+            ends.push(integrated.max(left));
         }
         ends
     }
 }
 
-/// How many of so many elements are at borders, which overlap at edges and corners: those of a small sub-domain much.
-pub fn overlapping(borders: f64, elements: f64) -> f64 {
-    if elements > 0.0 { elements * (1.0 - libm::exp(-borders / elements)) } else { 0.0 }
+/// Frames from one region to another queue on the one way out of it.
+fn pass_between_regions(frames: &mut [Frame], fleet: Fleet<'_>, costs: Costs) {
+    let is_far = |frame: &&mut Frame| !fleet.are_near(frame.from as usize, frame.to as usize);
+    let mut far: Vec<&mut Frame> = frames.iter_mut().filter(is_far).collect();
+    far.sort_by(|a, b| a.enters.total_cmp(&b.enters));
+    let mut ways: BTreeMap<u32, f64> = BTreeMap::new();
+    for frame in far {
+        let way = ways.entry(fleet.region(frame.from as usize)).or_default();
+        *way = (FAR_BYTE * costs.byte).mul_add(frame.bytes, way.max(frame.enters));
+        frame.enters = *way;
+    }
+}
+
+/// How many of so many elements are at borders. What is inside across one axis is as often inside across the others.
+pub fn overlapping(borders: Border, elements: f64) -> f64 {
+    let inside = |border: f64| (1.0 - border / elements).max(0.0);
+    if elements > 0.0 { elements * (1.0 - borders.into_iter().map(inside).product::<f64>()) } else { 0.0 }
 }
 
 /// Nodes that sub-domains of different workers share in one structured part.

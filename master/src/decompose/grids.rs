@@ -1,68 +1,167 @@
-//! Cutting grids of structured parts along index planes, recursively, for workers in halves.
+//! Cutting grids of structured parts along index planes, for workers in halves, again and again, or in rows.
 
 use mechanics::piece::Region;
 
-use super::crew::Crew;
+use super::{crew::Crew, exchange::Border};
 
-/// Recursive bisection along index planes, of all boxes together. Where whole planes miss the share of the workers by more than `near`, the
-/// last plane is divided once more, so that the miss is at most half a column along the part's shortest axis. Of `axes` it
-/// is that with the smaller interface.
-pub fn cut_planes(
-    boxes: Vec<Cells>,
-    (axes, shortest, near): (&[usize], usize, f64),
-    crew: Crew<'_>,
-    count: &dyn Fn(&Cells) -> u64,
-    out: &mut Vec<(Region, usize)>,
-) {
-    let volume: u64 = boxes.iter().map(count).sum();
-    if crew.workers.len() == 1 || volume <= 1 {
-        let worker = crew.fastest();
-        out.extend(boxes.into_iter().map(|Cells { low, high }| (Region::Cells { low, high }, worker)));
-        return;
-    }
-    let mut best: Option<(f64, Cut, usize)> = None;
-    for split in crew.splits() {
-        let target = volume as f64 * crew.divided(split)[0].speed() / crew.speed();
-        for &axis in axes {
-            let Some(whole) = Cut::whole(&boxes, axis, target, count) else { continue };
-            let interface = volume as f64 / whole.planes;
-            let missed = near * target.min(volume as f64 - target);
-            let (cut, dearer) = match Cut::jagged(&boxes, axis, shortest, target, count) {
-                Some(jagged) if whole.missed > missed && jagged.missed < whole.missed => (jagged, JAG),
-                _ => (whole, 1.0),
-            };
-            let score = interface * dearer + cut.missed;
-            if best.as_ref().is_none_or(|(least, ..)| score < least * (1.0 - 1e-9)) {
-                best = Some((score, cut, split));
-            }
+/// How a part is cut for its workers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// In halves, again and again, across that of these axes where fewest nodes are shared.
+    Halves(&'static [usize]),
+    /// In slabs across the first of these axes, slabs in rows across the next, rows in bricks across the last. Slabs and rows beside each other
+    /// are of different numbers of bricks, whose edges so do not meet: along three axes a brick has 14 neighbours, where a block of a grid has
+    /// 26, and along two it has 6 for 8.
+    Bricks(&'static [usize]),
+}
+
+use Shape::{Bricks, Halves};
+
+/// Shapes to try, in the order in which equals are preferred: a lane set lies along I, so a cut across J has fewer of them at
+/// the border and leaves rows long.
+pub const SHAPES: &[Shape] = &[
+    Halves(&[1, 0, 2]),
+    Halves(&[1, 0]),
+    Halves(&[1, 2]),
+    Halves(&[0, 2]),
+    Halves(&[1]),
+    Halves(&[0]),
+    Halves(&[2]),
+    Bricks(&[1, 0]),
+    Bricks(&[0, 1]),
+    Bricks(&[1, 2]),
+    Bricks(&[2, 1]),
+    Bricks(&[1, 2, 0]),
+    Bricks(&[2, 1, 0]),
+    Bricks(&[0, 1, 2]),
+];
+
+/// How near to the share of the workers whole planes have to come, relative to the smaller side. A plane that is divided brings shares
+/// nearer, and the workers at it more nodes and neighbours.
+pub const NEARS: [f64; 4] = [0.002, 0.02, 0.04, 0.08];
+/// How much a jagged interface counts against a plane one.
+const JAG: f64 = 1.1;
+
+/// Elements of a lane set, which are neighbours along I.
+const LANES: f64 = 4.5;
+
+/// A way to cut one part along index planes, of all its boxes together. Where whole planes miss the share of workers by more than `near`, the
+/// last plane is divided once more, so that the miss is at most half a column along the part's shortest axis.
+pub struct Cutting<'a> {
+    pub shape: Shape,
+    pub shortest: usize,
+    pub near: f64,
+    /// Elements of a box that count.
+    pub count: &'a dyn Fn(&Cells) -> u64,
+}
+
+impl Cutting<'_> {
+    /// Cuts boxes for these workers; `out` gets a region for each box that comes of it.
+    pub fn cut(&self, boxes: Vec<Cells>, crew: Crew<'_>, out: &mut Vec<(Region, usize)>) {
+        match self.shape {
+            Bricks(axes) if crew.is_near() => self.bricks(boxes, axes, crew, out),
+            Halves(axes) | Bricks(axes) => self.halves(boxes, axes, crew, out),
         }
     }
-    let Some((_, cut, split)) = best else {
-        let worker = crew.fastest();
-        out.extend(boxes.into_iter().map(|Cells { low, high }| (Region::Cells { low, high }, worker)));
-        return;
+
+    fn halves(&self, boxes: Vec<Cells>, axes: &[usize], crew: Crew<'_>, out: &mut Vec<(Region, usize)>) {
+        if crew.workers.len() == 1 || self.volume(&boxes) <= 1 {
+            return give(boxes, crew, out);
+        }
+        let mut best: Option<(f64, Cut, usize)> = None;
+        for split in crew.splits() {
+            for &axis in axes {
+                let Some((score, cut)) = self.across(&boxes, axis, crew.share(split)) else { continue };
+                if best.as_ref().is_none_or(|(least, ..)| score < least * (1.0 - 1e-9)) {
+                    best = Some((score, cut, split));
+                }
+            }
+        }
+        let Some((_, cut, split)) = best else { return give(boxes, crew, out) };
+        let [below, above] = cut.of(&boxes);
+        let [first, others] = crew.divided(split);
+        self.cut(below, first, out);
+        self.cut(above, others, out);
+    }
+
+    /// Groups of workers across the first axis, and bricks of each across the others.
+    fn bricks(&self, boxes: Vec<Cells>, axes: &[usize], crew: Crew<'_>, out: &mut Vec<(Region, usize)>) {
+        let n = crew.workers.len();
+        let Some((&axis, inner)) = axes.split_first().filter(|_| n > 1 && self.volume(&boxes) > 1) else {
+            return give(boxes, crew, out);
+        };
+        let planes = |a: usize| {
+            let low = boxes.iter().map(|cells| cells.low[a]).min().unwrap_or(0);
+            f64::from(boxes.iter().map(|cells| cells.high[a]).max().unwrap_or(0) - low)
+        };
+        // As many as make bricks as thick across this axis as across the others.
+        let edge =
+            libm::pow(axes.iter().map(|&a| planes(a)).product::<f64>() / n as f64, 1.0 / axes.len() as f64);
+        let groups = if inner.is_empty() { n } else { ((planes(axis) / edge).round() as usize).clamp(1, n) };
+        self.groups(boxes, (axis, inner), &uneven(n, groups), crew, out);
+    }
+
+    /// Boxes for groups of so many workers across an axis.
+    fn groups(
+        &self,
+        boxes: Vec<Cells>,
+        (axis, inner): (usize, &[usize]),
+        sizes: &[usize],
+        crew: Crew<'_>,
+        out: &mut Vec<(Region, usize)>,
+    ) {
+        let (some, others) = sizes.split_at(sizes.len() / 2);
+        let split = some.iter().sum();
+        if split == 0 {
+            return self.bricks(boxes, inner, crew, out);
+        }
+        let Some((_, cut)) = self.across(&boxes, axis, crew.share(split)) else {
+            return self.bricks(boxes, inner, crew, out);
+        };
+        let [below, above] = cut.of(&boxes);
+        let [first, last] = crew.divided(split);
+        self.groups(below, (axis, inner), some, first, out);
+        self.groups(above, (axis, inner), others, last, out);
+    }
+
+    /// The best cut across an axis with this share of the elements below it, and how bad it is.
+    fn across(&self, boxes: &[Cells], axis: usize, share: f64) -> Option<(f64, Cut)> {
+        let volume = self.volume(boxes) as f64;
+        let target = volume * share;
+        let whole = Cut::whole(boxes, axis, target, self.count)?;
+        let interface = volume / whole.planes;
+        let missed = self.near * target.min(volume - target);
+        let (cut, dearer) = match Cut::jagged(boxes, axis, self.shortest, target, self.count) {
+            Some(jagged) if whole.missed > missed && jagged.missed < whole.missed => (jagged, JAG),
+            _ => (whole, 1.0),
+        };
+        Some((interface * dearer + cut.missed, cut))
+    }
+
+    fn volume(&self, boxes: &[Cells]) -> u64 {
+        boxes.iter().map(self.count).sum()
+    }
+}
+
+/// Gives boxes that are not cut any more to one worker.
+fn give(boxes: Vec<Cells>, crew: Crew<'_>, out: &mut Vec<(Region, usize)>) {
+    let worker = crew.fastest();
+    out.extend(boxes.into_iter().map(|Cells { low, high }| (Region::Cells { low, high }, worker)));
+}
+
+/// Numbers of workers of groups beside each other, which differ: pairs of one with less than half of both and one with more, and one group
+/// before them if their number is odd. All are 1 for as many groups as workers.
+pub fn uneven(workers: usize, groups: usize) -> Vec<usize> {
+    if groups >= workers {
+        return vec![1; workers];
+    }
+    let first = (groups % 2 == 1).then(|| workers.div_ceil(groups));
+    let (left, pairs) = (workers - first.unwrap_or(0), groups / 2);
+    let pair = |at: usize| {
+        let both = (at + 1) * left / pairs - at * left / pairs;
+        [both - (both / 2 + 1), both / 2 + 1]
     };
-    let (mut below, mut above) = (Vec::new(), Vec::new());
-    for cells in &boxes {
-        let (low, rest) = cells.at(cut.axis, cut.plane);
-        below.extend(low);
-        let Some(rest) = rest else { continue };
-        match cut.row {
-            None => above.push(rest),
-            Some((second, row)) => {
-                let (layer, beyond) = rest.at(cut.axis, cut.plane + 1);
-                above.extend(beyond);
-                let (low, high) = layer.map_or((None, None), |layer| layer.at(second, row));
-                below.extend(low);
-                above.extend(high);
-            }
-        }
-    }
-    join(&mut below);
-    join(&mut above);
-    let [first, others] = crew.divided(split);
-    cut_planes(below, (axes, shortest, near), first, count, out);
-    cut_planes(above, (axes, shortest, near), others, count, out);
+    first.into_iter().chain((0..pairs).flat_map(pair)).filter(|&size| size > 0).collect()
 }
 
 /// Joins boxes that make up one, as those of a divided plane do on both sides once they are cut across it.
@@ -79,19 +178,6 @@ fn join(boxes: &mut Vec<Cells>) {
         }
     }
 }
-
-/// Sets of axes to cut along, in the order in which equals are preferred: a lane set lies along I, so a cut across J has fewer of them at
-/// the border and leaves rows long.
-pub const AXES: &[&[usize]] = &[&[1, 0, 2], &[1, 0], &[1, 2], &[0, 2], &[1], &[0], &[2]];
-
-/// How near to the share of the workers whole planes have to come, relative to the smaller side. A plane that is divided brings shares
-/// nearer, and the workers at it more nodes and neighbours.
-pub const NEARS: [f64; 4] = [0.002, 0.02, 0.04, 0.08];
-/// How much a jagged interface counts against a plane one.
-const JAG: f64 = 1.1;
-
-/// Elements of a lane set, which are neighbours along I.
-const LANES: f64 = 4.5;
 
 /// A box of cells of a structured part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,15 +200,15 @@ impl Cells {
     }
 
     /// Cells of each that are computed with those at the faces that both have: a lane set of them along I, and one across J or K.
-    pub fn border_with(&self, other: &Self) -> f64 {
+    pub fn border_with(&self, other: &Self) -> Border {
         let along = |a: usize| self.high[a].min(other.high[a]).saturating_sub(self.low[a].max(other.low[a]));
         let cells = |a: usize| f64::from(along(a));
         // Boxes do not overlap: along one axis at least they have no cell in common.
         match [0, 1, 2].map(|a| along(a) == 0) {
-            [true, false, false] => LANES * cells(1) * cells(2),
-            [false, true, false] => cells(0) * cells(2),
-            [false, false, true] => cells(0) * cells(1),
-            _ => 0.0,
+            [true, false, false] => [LANES * cells(1) * cells(2), 0.0, 0.0, 0.0],
+            [false, true, false] => [0.0, cells(0) * cells(2), 0.0, 0.0],
+            [false, false, true] => [0.0, 0.0, cells(0) * cells(1), 0.0],
+            _ => Border::default(),
         }
     }
 
@@ -163,6 +249,29 @@ struct Cut {
 }
 
 impl Cut {
+    /// What of some boxes lies below, and what above.
+    fn of(&self, boxes: &[Cells]) -> [Vec<Cells>; 2] {
+        let (mut below, mut above) = (Vec::new(), Vec::new());
+        for cells in boxes {
+            let (low, rest) = cells.at(self.axis, self.plane);
+            below.extend(low);
+            let Some(rest) = rest else { continue };
+            match self.row {
+                None => above.push(rest),
+                Some((second, row)) => {
+                    let (layer, beyond) = rest.at(self.axis, self.plane + 1);
+                    above.extend(beyond);
+                    let (low, high) = layer.map_or((None, None), |layer| layer.at(second, row));
+                    below.extend(low);
+                    above.extend(high);
+                }
+            }
+        }
+        join(&mut below);
+        join(&mut above);
+        [below, above]
+    }
+
     /// The plane whose lower side is nearest to `target` elements, with something on both sides.
     fn whole(boxes: &[Cells], axis: usize, target: f64, count: &dyn Fn(&Cells) -> u64) -> Option<Self> {
         let low = boxes.iter().map(|c| c.low[axis]).min()?;

@@ -103,7 +103,7 @@ impl Seams {
         let of = |(workers, [joined, facing]): ([u32; 2], [f64; 2])| Shared {
             workers,
             nodes: joined + ghosts(facing),
-            border: joined + facing,
+            border: [0.0, 0.0, 0.0, joined + facing],
         };
         shared.into_iter().map(of).collect()
     }

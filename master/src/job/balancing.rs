@@ -14,7 +14,7 @@ use protocol::message::Work;
 
 use crate::{
     balance::Costs,
-    decompose::{Fleet, Living, Subdomain, decompose, work},
+    decompose::{Fleet, Living, Subdomain, Traits, decompose, work},
     incident::Rebalance,
 };
 
@@ -84,10 +84,7 @@ pub(super) struct Shares {
 pub(super) struct Ground<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) costs: Costs,
-    /// Which elements are alive; none where nothing can erode.
-    pub(super) alive: Option<&'a [bool]>,
-    /// Whether parts may touch.
-    pub(super) touch: bool,
+    pub(super) traits: Traits<'a>,
 }
 
 /// Speeds that would be better, by position.
@@ -158,7 +155,7 @@ impl Balancing {
 fn propose(medians: &[[f64; 2]], slowest: f64, shares: &Shares, ground: &Ground<'_>) -> Option<Proposal> {
     let n = shares.speeds.len();
     // Those that have eroded since work was dealt out take no time.
-    let living = Living::new(ground.mesh, ground.alive);
+    let living = Living::new(ground.mesh, ground.traits.alive);
     let held = work(&shares.layout, n, 0.0, &living);
     // Elements over time, by position; none for workers without any.
     let measured: Vec<Option<f64>> = medians
@@ -187,7 +184,7 @@ fn propose(medians: &[[f64; 2]], slowest: f64, shares: &Shares, ground: &Ground<
         ground.mesh,
         Fleet { speeds: &speeds, regions: &shares.regions },
         ground.costs,
-        (ground.alive, ground.touch),
+        ground.traits,
     );
     let elements = work(&layout, n, 0.0, &living);
     // Contact in elements, dealt out by speed.
@@ -215,7 +212,7 @@ mod tests {
     /// Two workers that were dealt `mesh` by equal speeds.
     fn shares(mesh: &Mesh) -> Shares {
         let speeds = vec![1.0, 1.0];
-        let layout = decompose(mesh, Fleet::near(&speeds), Costs::NONE, (None, false));
+        let layout = decompose(mesh, Fleet::near(&speeds), Costs::NONE, Traits::default());
         let elements = work(&layout, 2, 0.0, &Living::new(mesh, None));
         Shares { speeds, elements, layout, held: Vec::new(), regions: Vec::new() }
     }
@@ -224,7 +221,7 @@ mod tests {
     fn a_worker_at_half_speed_is_given_half_of_the_work_of_the_other_and_told_so() {
         let mesh = bar();
         let shares = shares(&mesh);
-        let ground = Ground { mesh: &mesh, costs: Costs::NONE, alive: None, touch: false };
+        let ground = Ground { mesh: &mesh, costs: Costs::NONE, traits: Traits::default() };
         let mut balancing = Balancing::default();
         assert!(!balancing.look((20, 20), &[[100.0, 0.0], [103.0, 0.0]], &shares, &ground), "they agree");
         assert!(balancing.look((40, 20), &[[100.0, 0.0], [200.0, 0.0]], &shares, &ground));
@@ -239,7 +236,7 @@ mod tests {
     fn after_a_change_that_brought_nothing_the_next_waits_twice_as_long_each_time() {
         let mesh = bar();
         let shares = shares(&mesh);
-        let ground = Ground { mesh: &mesh, costs: Costs::NONE, alive: None, touch: false };
+        let ground = Ground { mesh: &mesh, costs: Costs::NONE, traits: Traits::default() };
         let mut balancing = Balancing::default();
         let slow = [[100.0, 0.0], [200.0, 0.0]];
         let mut changes = Vec::new();

@@ -33,7 +33,7 @@ use super::{
 };
 use crate::{
     balance::INTERACTIONS_PER_ELEMENT,
-    decompose::{self, Fleet, Living, decompose, held, work},
+    decompose::{self, Fleet, Living, Traits, decompose, held, work},
     event::{Action, Deal, WorkerSpec},
     exchange::Exchange,
     node_owners::NodeOwners,
@@ -134,10 +134,10 @@ impl Job {
         let speeds: Vec<f64> = speeds.unwrap_or_else(|| specs.iter().map(|spec| spec.speed).collect());
         let costs = self.options.costs();
         let alive = alive_in(state);
-        let touch = model.setup.contact.is_some();
         let regions = decompose::regions(specs.iter().map(|spec| &*spec.region));
         let fleet = Fleet { speeds: &speeds, regions: &regions };
-        let layout = decompose(&model.mesh, fleet, costs, (alive.as_deref(), touch));
+        let traits = Traits::of(&model.mesh, &model.setup, alive.as_deref());
+        let layout = decompose(&model.mesh, fleet, costs, traits);
         if model.output.workers {
             let owners: Arc<[u32]> = decompose::owners(&model.mesh, &layout).into();
             actions.push(Action::Owners(Arc::clone(&owners)));

@@ -7,6 +7,7 @@ use protocol::{message::ToWorker, options::Balance};
 
 use super::{Job, balancing::Ground, checkpoints::Checkpoint, error::Error, samples::Stopped, workers::Goes};
 use crate::{
+    decompose::Traits,
     event::{Action, WorkerSpec},
     incident::Loss,
 };
@@ -138,8 +139,7 @@ impl Job {
         let ground = Ground {
             mesh: &model.mesh,
             costs,
-            alive: alive.as_deref(),
-            touch: model.setup.contact.is_some(),
+            traits: Traits::of(&model.mesh, &model.setup, alive.as_deref()),
         };
         let interval = u64::from(model.setup.control.plan_interval);
         self.balancing.look((boundary, interval), &medians, &self.epoch.shares, &ground)

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use crate::{
     balance::{self, Costs},
-    decompose::{Fleet, Living, Subdomain, decompose, work},
+    decompose::{Fleet, Living, Subdomain, Traits, decompose, work},
 };
 
 /// Edges of the problems (elements), and the goal of each: time over the bound.
@@ -118,18 +118,19 @@ impl Sorted {
     pub fn row(&self, edge: u32, seed: u64, speeds: &[f64], costs: Costs) -> Row {
         let Costs { node, pair, .. } = costs;
         let mesh = &self.model.mesh;
-        let fleet = Fleet::near(speeds);
-        let layout = decompose(mesh, fleet, costs, (None, true));
+        let (fleet, traits) = (Fleet::near(speeds), Traits::of(mesh, &self.model.setup, None));
+        let layout = decompose(mesh, fleet, costs, traits);
         let living = Living::new(mesh, None);
         let elements = elements_of(&layout, speeds.len());
         let owner = owners(mesh, &layout);
         let owner = |node: u32| owner[self.surface.nodes[node as usize] as usize] as usize;
         let held = work(&layout, speeds.len(), node, &living);
-        let chosen = balance::assign(&self.units, (&self.weights, costs), fleet, &held, &owner);
+        let nodes = |unit: &WorkUnit| balance::nodes_of(unit, &self.surface);
+        let chosen = balance::assign(&self.units, (&self.weights, costs), fleet, &held, (&owner, &nodes));
         let pairs = self.pairs(&chosen, speeds.len());
 
         let slabs = slabs(mesh, speeds);
-        let whole = decompose(mesh, Fleet::near(&[1.0]), costs, (None, true));
+        let whole = decompose(mesh, Fleet::near(&[1.0]), costs, traits);
         let slab_owner = owners(mesh, &slabs);
         let slab_owner = |node: u32| slab_owner[self.surface.nodes[node as usize] as usize] as usize;
         let slab_chosen = balance::assign_to_owners(&self.units, speeds.len(), &slab_owner);

@@ -212,7 +212,8 @@ fn few_bytes_pass_between_regions_that_hosts_name_and_the_digest_stands() {
     let far = run(Regions { of_host, between });
     let bytes = [&near, &named, &far].map(|timeline| timeline.bytes_between(apart));
     assert!(2.0 * bytes[1] < bytes[0] && bytes[1] > 0.0, "{bytes:?}");
-    assert_eq!(bytes[2], bytes[1], "wires change no message");
+    // Times that workers report take as many bytes as their digits need.
+    assert!((bytes[2] / bytes[1] - 1.0).abs() < 1e-4, "wires change no message: {bytes:?}");
     assert!(far.seconds_per_cycle() > named.seconds_per_cycle());
     assert_eq!([&named.digest, &far.digest], [&near.digest; 2]);
 }
