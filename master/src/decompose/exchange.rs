@@ -1,9 +1,9 @@
 //! An estimate of the exchange of partial forces in a cycle, from which follows when the slowest worker ends it.
 //!
 //! Every worker computes its border elements and sends each neighbour a frame, in the order of the workers. A frame costs the processors at
-//! both ends, occupies the wire out of the sender, travels, and occupies the wire into the receiver. Interior elements
-//! are computed beside all that. A worker integrates when it has computed all elements and taken in all frames, and its vote leaves after its frames. It is what
-//! [`crate::simulate::virtual_clock`] charges, for one cycle that all begin at once.
+//! both ends, occupies the wire out of the sender, travels, and occupies the wire into the receiver; those between two regions queue on one
+//! way before that. Interior elements are computed beside all that. A worker integrates when it has computed all elements and taken in all
+//! frames, and its vote leaves after its frames. It is what [`crate::simulate::virtual_clock`] charges, for one cycle that all begin at once.
 
 use std::collections::BTreeMap;
 
