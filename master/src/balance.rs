@@ -183,10 +183,15 @@ pub fn assign(
     if costs.message > 0.0 {
         dealer.meet(units, owner, nodes);
     }
-    giving.iter().for_each(|&u| dealer.give(u, weights[u], &nodes(&units[u]), false));
+    let mut give = |u: usize, may_meet: bool| {
+        if dealer.is_late(dealer.chosen[u]) {
+            dealer.give(u, weights[u], &nodes(&units[u]), may_meet);
+        }
+    };
+    giving.iter().for_each(|&u| give(u, false));
     // Then to workers that the giver has not met, each of which takes many: those first that few hold.
     if costs.message > 0.0 {
-        giving.iter().rev().for_each(|&u| dealer.give(u, weights[u], &nodes(&units[u]), true));
+        giving.iter().rev().for_each(|&u| give(u, true));
     }
     dealer.chosen
 }
@@ -271,13 +276,11 @@ impl Dealer<'_> {
         one == other || self.known[one].contains(&other)
     }
 
-    /// Gives a unit of so many pairs, and with these nodes, to the worker that ends it first, if its own is late; where messages cost, if that
-    /// one is by half as much at most. Workers meet only if they `may`, and if the giver is late by more than that costs on both sides.
+    /// Gives a unit of so many pairs, and with these nodes, from a worker that is late to the one that ends it first; where messages cost,
+    /// if that one is late by half as much at most. Workers meet only if they `may`, and if the giver is late by more than that costs on both
+    /// sides.
     fn give(&mut self, u: usize, weight: u64, nodes: &[u32], may_meet: bool) {
         let from = self.chosen[u];
-        if !self.is_late(from) {
-            return;
-        }
         let before = self.finish(from, self.load[from]);
         let late = before - self.level;
         let far = FAR_BYTE * self.costs.byte * NODE_BYTES * nodes.len() as f64;
