@@ -81,7 +81,7 @@ pub fn cases() -> Vec<Case> {
             for (deaths, name) in ["a", "b", "c"].into_iter().enumerate() {
                 cluster.worker_that_fails(name, "die-in-load:1");
                 let died = || format!("death {}; {}", deaths + 1, cluster.master.text());
-                until(died, || (cluster.master.count("connection closed") > deaths).then_some(()));
+                until(died, || (cluster.master.count("WARN connection from") > deaths).then_some(()));
             }
             wait_for_state(&cluster, 1, "held");
             cluster.worker("d", "1");

@@ -165,7 +165,8 @@ pub fn cases() -> Vec<Case> {
             let mut cluster = scene.cluster(&[], None, &[]);
             cluster.worker("a", "1");
             cluster.worker("b", "1");
-            cluster.worker_that_fails("c", "flip:100");
+            // Between two plan boundaries: where an interval ends, a worker lets go of what it held, and of the bit with it.
+            cluster.worker_that_fails("c", "flip:107");
             let running = scene.submit_asking(cluster, &["--verify", "1"]);
             running.wait_for_cycle(1);
             let summary = scene.end(&running);
