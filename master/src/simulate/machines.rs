@@ -145,6 +145,8 @@ impl Scheme {
             },
             dealing: self.dealing,
             costs: dealt_by,
+            // The master's host has a worker too.
+            beside: true,
             ..SessionOptions::default()
         }
     }
