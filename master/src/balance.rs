@@ -40,6 +40,22 @@ impl Default for Costs {
     }
 }
 
+/// What a worker has to do in a cycle beside contact, in element-cycles.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Base {
+    /// What its processor takes: elements, nodes and messages.
+    pub busy: f64,
+    /// When it ends, with what it waits for wires.
+    pub end: f64,
+}
+
+impl Base {
+    /// Of a worker that waits for nothing.
+    pub fn of(busy: f64) -> Self {
+        Self { busy, end: busy }
+    }
+}
+
 /// Interactions that cost as much as one element-cycle: of the plates of 64,000 elements 4.6 make a pair, and a pair costs
 /// 1.2 elements (`bolide simulate --decomposition --json`, `--measure-costs`).
 pub const INTERACTIONS_PER_ELEMENT: f64 = 3.8;
@@ -103,7 +119,7 @@ const TOLERANCE: f64 = 0.001;
 
 /// When all workers have ended if pairs fill up those that end their sub-domains first (element-cycles at speed 1).
 /// Contact so levels what index planes left uneven.
-fn level(speeds: &[f64], work: &[f64], contact: f64) -> f64 {
+pub fn level(speeds: &[f64], work: &[f64], contact: f64) -> f64 {
     let mut order: Vec<usize> = (0..speeds.len()).collect();
     let finish = |w: usize| work[w] / speeds[w];
     order.sort_by(|&a, &b| finish(a).total_cmp(&finish(b)).then(a.cmp(&b)));
@@ -149,15 +165,16 @@ pub fn assign_to_owners(units: &[WorkUnit], n: usize, owner: &dyn Fn(u32) -> usi
 /// Surface nodes that a unit needs, ascending.
 type Nodes<'a> = dyn Fn(&WorkUnit) -> Vec<u32> + 'a;
 
-/// Worker of each unit. `weights` are the units' pairs; `work` is what the workers' sub-domains cost (element-cycles); `owner` gives the
-/// worker that owns a surface node's elements, and `nodes` those that a unit needs ([`nodes_of`]). A worker that finishes late by less than the
-/// messages of two new neighbours keeps its units. Messages of workers that exchanged no node before count on both sides. A unit leaves the
-/// region of its owner only if that gains more than the bytes of all units that do take between two regions.
+/// Worker of each unit. `weights` are the units' pairs; `bases` is what the workers do beside them; `owner` gives the
+/// worker that owns a surface node's elements, and `nodes` those that a unit needs ([`nodes_of`]). A worker keeps its units if its processor is
+/// late by less than the messages of two new neighbours: what it waits for wires would not be less without them. Messages of workers that
+/// exchanged no node before count on both sides. A unit leaves the region of its owner only if that gains more than the bytes of all units that
+/// do take between two regions.
 pub fn assign(
     units: &[WorkUnit],
     (weights, costs): (&[u64], Costs),
     fleet: Fleet<'_>,
-    work: &[f64],
+    bases: &[Base],
     (owner, nodes): (&dyn Fn(u32) -> usize, &Nodes<'_>),
 ) -> Vec<usize> {
     let speeds = fleet.speeds;
@@ -170,9 +187,10 @@ pub fn assign(
     for (weight, &worker) in weights.iter().zip(&chosen) {
         load[worker] += weight;
     }
-    let level = level(speeds, work, costs.pair * load.iter().sum::<u64>() as f64);
-    let (work, known, holders) = (work.to_vec(), Vec::new(), Vec::new());
-    let mut dealer = Dealer { costs, fleet, work, load, chosen, known, holders, level, between: 0.0 };
+    let ends: Vec<f64> = bases.iter().map(|base| base.end).collect();
+    let level = level(speeds, &ends, costs.pair * load.iter().sum::<u64>() as f64);
+    let (bases, known, holders) = (bases.to_vec(), Vec::new(), Vec::new());
+    let mut dealer = Dealer { costs, fleet, bases, load, chosen, known, holders, level, between: 0.0 };
     let is_late = |u: &usize| weights[*u] > 0 && dealer.is_late(dealer.chosen[*u]);
     let mut giving: Vec<usize> = (0..units.len()).filter(is_late).collect();
     if giving.is_empty() {
@@ -209,8 +227,8 @@ pub fn nodes_of(unit: &WorkUnit, surface: &Surface) -> Vec<u32> {
 struct Dealer<'a> {
     costs: Costs,
     fleet: Fleet<'a>,
-    /// By worker: element-cycles of its sub-domains and of messages to those that it has met.
-    work: Vec<f64>,
+    /// By worker: what it does beside contact, with messages to those that it has met.
+    bases: Vec<Base>,
     /// By worker: pairs of its units.
     load: Vec<u64>,
     /// Worker of each unit.
@@ -226,8 +244,14 @@ struct Dealer<'a> {
 }
 
 impl Dealer<'_> {
-    fn finish(&self, worker: usize, load: u64) -> f64 {
-        self.costs.pair.mul_add(load as f64, self.work[worker]) / self.fleet.speeds[worker]
+    /// When a worker with so many pairs ends, after what it has to do `before`.
+    fn finish(&self, worker: usize, load: u64, before: f64) -> f64 {
+        self.costs.pair.mul_add(load as f64, before) / self.fleet.speeds[worker]
+    }
+
+    /// When the processor of a worker is done with what it has now.
+    fn done(&self, worker: usize) -> f64 {
+        self.finish(worker, self.load[worker], self.bases[worker].busy)
     }
 
     /// What a neighbour more costs a worker.
@@ -238,7 +262,7 @@ impl Dealer<'_> {
     /// Whether a worker ends later than the others by more than it costs to give units away.
     fn is_late(&self, worker: usize) -> bool {
         let limit = self.level.mul_add(1.0 + TOLERANCE, 2.0 * self.meeting(worker));
-        self.finish(worker, self.load[worker]) > limit
+        self.done(worker) > limit
     }
 
     /// Workers that hold nodes of units meet.
@@ -281,7 +305,7 @@ impl Dealer<'_> {
     /// sides.
     fn give(&mut self, u: usize, weight: u64, nodes: &[u32], may_meet: bool) {
         let from = self.chosen[u];
-        let before = self.finish(from, self.load[from]);
+        let before = self.done(from);
         let late = before - self.level;
         let far = FAR_BYTE * self.costs.byte * NODE_BYTES * nodes.len() as f64;
         let holders = self.holders_of(nodes);
@@ -290,7 +314,7 @@ impl Dealer<'_> {
         let (mut best, mut to) = (enough, from);
         for other in (0..self.load.len()).filter(|&other| other != from) {
             let way = if self.fleet.are_near(from, other) { 0.0 } else { self.between + far };
-            let computed = self.finish(other, self.load[other] + weight) + way;
+            let computed = self.finish(other, self.load[other] + weight, self.bases[other].end) + way;
             if computed < best {
                 let new = holders.iter().filter(|&&holder| !self.has_met(other, holder)).count() as f64;
                 let after = new.mul_add(self.meeting(other), computed);
@@ -308,7 +332,8 @@ impl Dealer<'_> {
         for holder in holders {
             if !self.has_met(to, holder) {
                 for (one, other) in [(to, holder), (holder, to)] {
-                    self.work[one] += NEIGHBOUR * self.costs.message;
+                    self.bases[one].busy += NEIGHBOUR * self.costs.message;
+                    self.bases[one].end += NEIGHBOUR * self.costs.message;
                     self.known[one].insert(other);
                 }
             }
@@ -334,6 +359,10 @@ mod tests {
         unit.nodes.clone()
     }
 
+    fn bases(busy: &[f64]) -> Vec<Base> {
+        busy.iter().copied().map(Base::of).collect()
+    }
+
     const PAIRS: Costs = Costs { pair: 1.2, ..Costs::NONE };
 
     fn unit(i: i32, nodes: Vec<u32>, interactions: u64) -> WorkUnit {
@@ -345,7 +374,7 @@ mod tests {
         let units: Vec<_> = (0..8).map(|i| unit(i, vec![i as u32], 10)).collect();
         let owner = |n: u32| (n % 2) as usize;
         assert_eq!(
-            assign(&units, (&[10; 8], PAIRS), Fleet::near(&[1.0, 1.0]), &[1e4; 2], (&owner, &own)),
+            assign(&units, (&[10; 8], PAIRS), Fleet::near(&[1.0, 1.0]), &bases(&[1e4; 2]), (&owner, &own)),
             [0, 1, 0, 1, 0, 1, 0, 1]
         );
     }
@@ -365,7 +394,7 @@ mod tests {
             &units,
             (&[10; 400], PAIRS),
             Fleet::near(&speeds),
-            &[500.0, 1000.0, 500.0],
+            &bases(&[500.0, 1000.0, 500.0]),
             (&|_| 0, &own),
         );
         for (w, s) in speeds.iter().enumerate() {
@@ -379,8 +408,13 @@ mod tests {
     fn contact_levels_what_index_planes_left_uneven() {
         assert!((level(&[1.0, 1.0, 2.0], &[100.0, 110.0, 220.0], 40.0) - 117.5).abs() < 1e-9);
         let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 1)).collect();
-        let chosen =
-            assign(&units, (&[1; 100], PAIRS), Fleet::near(&[1.0, 1.0]), &[1000.0, 1060.0], (&|_| 1, &own));
+        let chosen = assign(
+            &units,
+            (&[1; 100], PAIRS),
+            Fleet::near(&[1.0, 1.0]),
+            &bases(&[1000.0, 1060.0]),
+            (&|_| 1, &own),
+        );
         let first = chosen.iter().filter(|&&w| w == 0).count();
         // 120 elements' worth of pairs: 90 to the first, 30 to the other.
         assert!((70..=76).contains(&first), "{first}");
@@ -391,7 +425,13 @@ mod tests {
         assert_eq!(level(&[1.0, 1.0], &[100.0, 110.0], 8.0), 108.0);
         let units: Vec<_> = (0..6).map(|i| unit(i, vec![i as u32], 1)).collect();
         assert_eq!(
-            assign(&units, (&[1; 6], PAIRS), Fleet::near(&[1.0, 1.0]), &[100.0, 110.0], (&|_| 1, &own)),
+            assign(
+                &units,
+                (&[1; 6], PAIRS),
+                Fleet::near(&[1.0, 1.0]),
+                &bases(&[100.0, 110.0]),
+                (&|_| 1, &own)
+            ),
             [0; 6]
         );
     }
@@ -412,7 +452,8 @@ mod tests {
         let receivers = |message: f64, first: f64| {
             let costs = Costs { message, ..PAIRS };
             let work: Vec<f64> = (0..20).map(|w| if w == 0 { first } else { 5000.0 }).collect();
-            let chosen = assign(&units, (&[10; 400], costs), Fleet::near(&[1.0; 20]), &work, (&owner, &own));
+            let chosen =
+                assign(&units, (&[10; 400], costs), Fleet::near(&[1.0; 20]), &bases(&work), (&owner, &own));
             chosen.into_iter().filter(|&w| w != 0).collect::<BTreeSet<_>>().len()
         };
         assert_eq!(receivers(0.0, 5000.0), 19, "all share what costs no message");
@@ -428,7 +469,7 @@ mod tests {
         let chosen = |byte: f64| {
             let costs = Costs { byte, ..PAIRS };
             let fleet = Fleet { speeds: &[1.0; 4], regions: &[0, 0, 1, 1] };
-            let chosen = assign(&units, (&[10; 100], costs), fleet, &[1e3; 4], (&|_| 0, &own));
+            let chosen = assign(&units, (&[10; 100], costs), fleet, &bases(&[1e3; 4]), (&|_| 0, &own));
             [0, 1, 2, 3].map(|worker| chosen.iter().filter(|&&w| w == worker).count())
         };
         assert_eq!(chosen(0.0), [25; 4]);
@@ -442,13 +483,28 @@ mod tests {
     }
 
     #[test]
+    fn what_a_worker_waits_for_wires_is_no_reason_to_give_units_away_but_one_to_take_none() {
+        let units: Vec<_> = (0..100).map(|i| unit(i, vec![i as u32], 10)).collect();
+        let taken = |bases: [Base; 2]| {
+            let near = Fleet::near(&[1.0; 2]);
+            let chosen = assign(&units, (&[10; 100], PAIRS), near, &bases, (&|_| 0, &own));
+            chosen.into_iter().filter(|&worker| worker == 1).count()
+        };
+        let waits = Base { busy: 1000.0, end: 3000.0 };
+        assert_eq!(taken([Base::of(1000.0); 2]), 50);
+        assert_eq!(taken([waits, Base::of(1000.0)]), 0, "of 2200 until 3000");
+        assert_eq!(taken([Base::of(2000.0), waits]), 8, "of 3200 until 3103");
+    }
+
+    #[test]
     fn a_unit_stays_where_it_is_if_many_hold_the_nodes_of_its_faces() {
         let owner = |node: u32| node as usize / 100;
         let units: Vec<_> = (0..50).map(|i| unit(i, vec![i as u32], 10)).collect();
         let costs = Costs { message: 65.0, ..PAIRS };
         let given = |nodes: &Nodes<'_>| {
             let work = [1000.0, 400.0, 1600.0, 1600.0, 1600.0, 1600.0];
-            let chosen = assign(&units, (&[10; 50], costs), Fleet::near(&[1.0; 6]), &work, (&owner, nodes));
+            let chosen =
+                assign(&units, (&[10; 50], costs), Fleet::near(&[1.0; 6]), &bases(&work), (&owner, nodes));
             chosen.into_iter().filter(|&worker| worker == 1).count()
         };
         assert!(given(&own) > 10, "{}", given(&own));

@@ -4,16 +4,16 @@
 //! neighbouring parts fall on one worker; or each part has workers of its own, which then have few neighbours. Structured parts are cut
 //! along index planes ([`grids`], paper section 3), explicit ones by recursive coordinate bisection. Columns and slabs that are cut along two
 //! axes or one share nodes with fewer others than blocks do, and rows of bricks with fewer than grids, which pays where messages cost more than
-//! nodes and wires are fast. The best of several groupings and shapes wins, by the slowest finish of elements, nodes and the exchange of
-//! partial forces ([`exchange`]). Elements that have eroded cost nothing ([`Living`]); they are dealt out all the same, since their state is
-//! still held.
+//! nodes and wires are fast. The best of several groupings and shapes wins, by the slowest finish of elements, nodes, contact, the exchange of
+//! partial forces ([`exchange`]) and votes ([`crate::tree`]). Elements that have eroded cost nothing ([`Living`]); they are dealt out all the
+//! same, since their state is still held.
 
 mod crew;
 mod exchange;
 mod grids;
 mod seams;
 
-use std::mem::discriminant;
+use std::{collections::HashSet, mem::discriminant};
 
 use mechanics::{
     mesh::{Mesh, Topology},
@@ -21,7 +21,12 @@ use mechanics::{
     setup::Setup,
 };
 
-use crate::balance::Costs;
+use protocol::message::Tree;
+
+use crate::{
+    balance::{Base, Costs},
+    tree,
+};
 use crew::{Crew, Halves};
 pub use crew::{Fleet, regions};
 use exchange::{Exchange, Held};
@@ -58,11 +63,20 @@ const NEAR: f64 = 1.15;
 /// A shape that ended so many times later than the best is not tried with further groupings.
 const FAR: f64 = 1.5;
 
+/// Boxes that a worker holds of a part at most, in the mean: each has rows of its own, whose ends fill lane sets less well.
+const MOST_BOXES: usize = 5;
+
+/// With contact, cycles of so many ways of a message are long enough for the estimate.
+const WAYS: f64 = 10.0;
+
+/// Shares that are corrected come as near to what they are to be as so much of the time of a message.
+const FINEST: f64 = 0.25;
+
 /// Workers wait for wires if they end so many times later than their work alone takes.
 const WAITS: f64 = 1.03;
 
 /// A correction by the ends has to gain so much, as the estimate knows a wire less well than work: of workers of one speed, and of several.
-const GAINS: [f64; 2] = [1.01, 1.03];
+const GAINS: [f64; 2] = [1.003, 1.03];
 
 /// Of the elements of a worker or of a part, the lesser: a worker has no piece of a part that is less.
 const LEAST_PIECE: f64 = 0.05;
@@ -76,6 +90,8 @@ pub struct Traits<'a> {
     pub touch: bool,
     /// An element of any part takes as long as one of any other.
     pub alike: bool,
+    /// Most neighbours that are children of a worker in the tree of votes ([`crate::tree`]), if there is one.
+    pub children: Option<usize>,
 }
 
 impl<'a> Traits<'a> {
@@ -88,7 +104,7 @@ impl<'a> Traits<'a> {
         };
         let are_alike = mesh.parts.windows(2).all(|two| kind(&two[0]) == kind(&two[1]));
         let alike = are_alike && setup.bodies.is_empty() && setup.switches.is_empty();
-        Self { alive, touch: setup.contact.is_some(), alike }
+        Self { alive, touch: setup.contact.is_some(), alike, children: None }
     }
 }
 
@@ -112,31 +128,48 @@ struct Way {
     apart: bool,
 }
 
+/// The sub-domains of [`cut`].
+pub fn decompose(mesh: &Mesh, fleet: Fleet<'_>, costs: Costs, traits: Traits<'_>) -> Vec<Subdomain> {
+    cut(mesh, fleet, costs, traits).subdomains
+}
+
+/// A mesh that has been cut for workers.
+#[derive(Clone, Debug, Default)]
+pub struct Cut {
+    pub subdomains: Vec<Subdomain>,
+    /// By worker: its place in the tree of votes, whose messages the cut makes up for. None without a tree, and where some parts are no grids.
+    pub tree: Vec<Tree>,
+    /// What each worker does in a cycle beside contact.
+    pub bases: Vec<Base>,
+}
+
 /// Cuts the mesh for these workers. Sub-domains come part by part, shells first; those without elements are left
 /// out, so a worker may have none in a small problem.
-pub fn decompose(mesh: &Mesh, fleet: Fleet<'_>, costs: Costs, traits: Traits<'_>) -> Vec<Subdomain> {
+pub fn cut(mesh: &Mesh, fleet: Fleet<'_>, costs: Costs, traits: Traits<'_>) -> Cut {
     let speeds = fleet.speeds;
     let n = speeds.len();
     let equal = speeds.iter().all(|s| *s == speeds[0]);
     let is_structured = |part: &mechanics::mesh::Part| matches!(part.topology, Topology::Structured { .. });
     let has_choice = n > 1 && costs.message > 0.0 && mesh.parts.iter().any(is_structured);
     let shapes = if has_choice { SHAPES } else { &SHAPES[..1] };
-    let may_be_apart = has_choice
-        && traits.alike
-        && !traits.touch
-        && mesh.parts.len() > 1
-        && mesh.parts.iter().all(is_structured);
     let (groupings, by_work) = if n < 3 || equal { (1, 0) } else { (GROUPINGS.min(2 + TRIED / n), BY_WORK) };
-    // Contact is dealt out by work, so those that got fewer elements would get it, and with it more ghosts.
-    let by_ends = if has_choice && !traits.touch { BY_ENDS.min(TRIED / n) } else { 0 };
-    let mut search = Search {
-        mesh,
-        fleet,
-        costs,
-        living: Living::new(mesh, traits.alive),
-        seams: if has_choice { Seams::new(mesh, traits.touch) } else { Seams::default() },
-        best: None,
-    };
+    let living = Living::new(mesh, traits.alive);
+    let seams = if has_choice { Seams::new(mesh, traits.touch) } else { Seams::default() };
+    let mut sizes = living.of_parts(mesh);
+    for (size, pairs) in sizes.iter_mut().zip(seams.pairs_of_parts(mesh.parts.len())) {
+        *size += costs.pair * pairs;
+    }
+    // Contact that the estimate does not know would be dealt to those that got fewer elements, and with it more ghosts. And how long a short
+    // cycle takes is up to the ways of messages.
+    let all_structured = mesh.parts.iter().all(is_structured);
+    let is_long =
+        sizes.iter().sum::<f64>() > WAYS * (costs.travel + costs.message) * speeds.iter().sum::<f64>();
+    let is_known = !traits.touch || all_structured && is_long;
+    let by_ends = if has_choice && is_known { BY_ENDS.min(TRIED / n) } else { 0 };
+    let may_be_apart = has_choice && traits.alike && mesh.parts.len() > 1 && all_structured && is_known;
+    // Who is a neighbour is known of structured parts.
+    let children = traits.children.filter(|_| has_choice && all_structured);
+    let mut search = Search { mesh, sizes, fleet, costs, living, seams, children, best: None };
     // Each way, and what it came to at the best.
     let with = |apart: bool| shapes.iter().map(move |&shape| Way { shape, near: NEARS[0], apart });
     let mut ways: Vec<(Way, f64)> = with(false).map(|way| (way, f64::INFINITY)).collect();
@@ -158,6 +191,8 @@ pub fn decompose(mesh: &Mesh, fleet: Fleet<'_>, costs: Costs, traits: Traits<'_>
             }
         }
     }
+    // It takes several boxes to come nearer, which is not worth less than a message.
+    let finest = NEARS[0].max(FINEST * costs.message * n as f64 / search.sizes.iter().sum::<f64>());
     let by_count = (0..groupings).map(|seed| (seed, Halves::Count));
     let by_speed = (0..groupings.min(BY_SPEED)).filter(|_| !equal).map(|seed| (seed, Halves::Speed));
     for (seed, halves) in by_count.chain(by_speed) {
@@ -165,23 +200,30 @@ pub fn decompose(mesh: &Mesh, fleet: Fleet<'_>, costs: Costs, traits: Traits<'_>
         for (way, ended) in &mut ways {
             let is_divided = halves == Halves::Count || matches!(way.shape, Shape::Halves(_));
             if is_divided && !(ended.is_finite() && *ended > FAR * search.least()) {
-                let how = How { order: &order, halves, way: *way };
-                *ended = ended.min(search.cut(how, (by_work, by_ends)));
+                // Where planes are divided, shares come nearer to what corrections ask for.
+                for near in [way.near, finest].into_iter().take(if way.near > finest { 2 } else { 1 }) {
+                    let how = How { order: &order, halves, way: Way { near, ..*way } };
+                    *ended = ended.min(search.cut(how, (by_work, by_ends)));
+                }
             }
         }
     }
-    search.best.map(|(_, subdomains)| subdomains).unwrap_or_default()
+    search.best.map(|(_, cut)| cut).unwrap_or_default()
 }
 
 /// The search for the cut whose slowest worker ends a cycle first.
 struct Search<'a> {
     mesh: &'a Mesh,
+    /// By part: element-cycles of its living elements and of its contact.
+    sizes: Vec<f64>,
     fleet: Fleet<'a>,
     costs: Costs,
     living: Living,
     seams: Seams,
+    /// As in [`Traits`].
+    children: Option<usize>,
     /// The best so far, and when its slowest worker ends.
-    best: Option<(f64, Vec<Subdomain>)>,
+    best: Option<(f64, Cut)>,
 }
 
 impl Search<'_> {
@@ -198,52 +240,63 @@ impl Search<'_> {
         let n = speeds.len();
         let mut ended = f64::INFINITY;
         let mut shares = speeds.to_vec();
+        let mut before = Vec::new();
         for correction in 0..=by_work + by_ends {
-            let subdomains = cut_all(mesh, fleet, &shares, how, &self.living);
-            let held = held_by(&subdomains, n, &self.living);
-            let work: Vec<f64> = held.iter().map(|held| held.work(costs.node)).collect();
+            let subdomains = cut_all((mesh, &self.sizes), fleet, &shares, how, &self.living);
+            let pieces: HashSet<(usize, usize)> = subdomains.iter().map(|s| (s.part, s.worker)).collect();
+            if subdomains.len() > MOST_BOXES * pieces.len() && self.best.is_some() {
+                break;
+            }
+            let mut held = held_by(&subdomains, n, &self.living);
+            let (shared, pairs) = self.seams.between(&subdomains, n);
+            held.iter_mut().zip(pairs).for_each(|(held, pairs)| held.pairs = pairs);
+            let work: Vec<f64> = held.iter().map(|held| held.work(costs)).collect();
             let computed: Vec<f64> = work.iter().zip(speeds).map(|(work, speed)| work / speed).collect();
+            let level = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
             let least = self.least();
             // An equal finish keeps the earlier grouping, and the first is the order the user gave.
             let gain = if correction > by_work { GAINS[usize::from(by_work > 0)] } else { 1.0 + 1e-9 };
             let is_better = |ends: &[f64]| last(ends) * gain < least;
-            let ends = if costs.message > 0.0 && is_better(&computed) {
-                Exchange::new(mesh, &subdomains, n, &self.seams).ends(&held, fleet, costs)
-            } else {
-                computed.clone()
-            };
+            let (mut tree, mut cycle) = (Vec::new(), work.iter().copied().map(Base::of).collect::<Vec<_>>());
+            if costs.message > 0.0 && is_better(&computed) {
+                let exchange = Exchange::new(mesh, &subdomains, n, shared);
+                if let Some(children) = self.children {
+                    tree = tree::tree(&exchange.neighbours(), fleet, (children, &before), (level, costs));
+                    held.iter_mut().zip(tree::messages(&tree)).for_each(|(held, votes)| held.votes = votes);
+                }
+                cycle = exchange.cycle(&held, fleet, costs);
+            }
+            let ends: Vec<f64> = cycle.iter().zip(speeds).map(|(base, speed)| base.end / speed).collect();
             ended = ended.min(last(&ends));
-            let waits = last(&ends) > WAITS * last(&computed);
+            let waits = last(&ends) > WAITS * level;
             let far = waits && last(&ends) > NEAR * least;
             if is_better(&ends) {
-                self.best = Some((last(&ends), subdomains));
+                let beside = |(base, held): (&Base, &Held)| {
+                    let contact = costs.pair * held.pairs;
+                    Base { busy: base.busy - contact, end: base.end - contact }
+                };
+                let bases = cycle.iter().zip(&held).map(beside).collect();
+                self.best = Some((last(&ends), Cut { subdomains, tree: tree.clone(), bases }));
             }
             if far || correction >= by_work && !waits {
                 break;
             }
             if correction < by_work {
-                // Ragged pieces have more nodes: their workers get fewer elements in the next try.
-                let mean = work.iter().sum::<f64>() / speeds.iter().sum::<f64>();
+                // Ragged pieces have more nodes, and contact takes time: their workers get fewer elements in the next try.
                 for (share, computed) in shares.iter_mut().zip(&computed) {
-                    *share *= if *computed > 0.0 { mean / computed } else { 1.0 };
+                    *share *= if *computed > 0.0 { level / computed } else { 1.0 };
                 }
             } else {
-                // Those that end late because of wires get fewer too.
+                // Those that end late because of wires or of votes get fewer too. Once shares are about right, hubs stay, as shares would
+                // follow them.
+                if correction > by_work {
+                    before = tree;
+                }
                 let mean = ends.iter().sum::<f64>() / n as f64;
                 shares.iter_mut().zip(&ends).for_each(|(share, end)| *share *= mean / end.max(0.1 * mean));
             }
         }
         ended
-    }
-}
-
-/// What each worker's sub-domains cost in a cycle (element-cycles): living elements, nodes, and messages to those that share nodes.
-pub fn held(mesh: &Mesh, subdomains: &[Subdomain], n: usize, costs: Costs, living: &Living) -> Vec<f64> {
-    let work = work(subdomains, n, costs.node, living);
-    if costs.message > 0.0 {
-        Exchange::new(mesh, subdomains, n, &Seams::default()).add_messages(work, costs.message)
-    } else {
-        work
     }
 }
 
@@ -278,7 +331,8 @@ pub fn owners(mesh: &Mesh, subdomains: &[Subdomain]) -> Vec<u32> {
 
 /// What each worker's sub-domains cost in a cycle (element-cycles): their living elements, and all their nodes at `node` each.
 pub fn work(subdomains: &[Subdomain], n: usize, node: f64, living: &Living) -> Vec<f64> {
-    held_by(subdomains, n, living).iter().map(|held| held.work(node)).collect()
+    let costs = Costs { node, ..Costs::NONE };
+    held_by(subdomains, n, living).iter().map(|held| held.work(costs)).collect()
 }
 
 /// Living elements and nodes of each worker.
@@ -411,23 +465,21 @@ struct Own {
     shares: Vec<f64>,
 }
 
-/// Deals parts of so many elements out to workers in their order and by their speeds: those at the end of one have a piece of the next one too.
-/// What each has of a part is changed as `shares` are from speeds.
+/// Deals parts of such sizes out to workers in their order and by their shares: those at the end of one have a piece of the next one too.
 fn own(sizes: &[f64], crew: Crew<'_>, shares: &[f64]) -> Vec<Own> {
-    let speeds = crew.fleet.speeds;
-    let by_speed = sizes.iter().sum::<f64>() / crew.speed();
+    let by_share = sizes.iter().sum::<f64>() / crew.workers.iter().map(|&w| shares[w]).sum::<f64>();
     let mut end = 0.0;
     let of_part = |size: &f64| {
         let begin = end;
         end += size;
-        let mut own = Own { workers: Vec::new(), shares: vec![0.0; speeds.len()] };
+        let mut own = Own { workers: Vec::new(), shares: vec![0.0; shares.len()] };
         let mut at = 0.0;
         for &worker in crew.workers {
-            let all = by_speed * speeds[worker];
+            let all = by_share * shares[worker];
             let common = (at + all).min(end) - at.max(begin);
             if common > LEAST_PIECE * all.min(*size) {
                 own.workers.push(worker);
-                own.shares[worker] = common * shares[worker] / speeds[worker];
+                own.shares[worker] = common;
             }
             at += all;
         }
@@ -436,10 +488,16 @@ fn own(sizes: &[f64], crew: Crew<'_>, shares: &[f64]) -> Vec<Own> {
     sizes.iter().map(of_part).collect()
 }
 
-fn cut_all(mesh: &Mesh, fleet: Fleet<'_>, shares: &[f64], how: How<'_>, living: &Living) -> Vec<Subdomain> {
+fn cut_all(
+    (mesh, sizes): (&Mesh, &[f64]),
+    fleet: Fleet<'_>,
+    shares: &[f64],
+    how: How<'_>,
+    living: &Living,
+) -> Vec<Subdomain> {
     let How { order, halves, way: Way { shape, near, apart } } = how;
     let all = Crew { fleet: fleet.with(shares), workers: order, halves };
-    let owns = if apart { own(&living.of_parts(mesh), Crew { fleet, ..all }, shares) } else { Vec::new() };
+    let owns = if apart { own(sizes, Crew { fleet, ..all }, shares) } else { Vec::new() };
     let mut out = Vec::new();
     for (part, mesh_part) in mesh.parts.iter().enumerate() {
         let crew = owns.get(part).map_or(all, |own| Crew {

@@ -260,7 +260,7 @@ mod tests {
     use mechanics::{contact::BatchNode, piece::Region};
 
     use super::*;
-    use crate::decompose::Subdomain;
+    use crate::{balance::Base, decompose::Subdomain};
 
     /// Small numbers without end.
     fn random(seed: u64) -> impl FnMut(u32) -> u32 {
@@ -292,7 +292,7 @@ mod tests {
             let subdomains: Vec<Subdomain> = (0..n)
                 .map(|worker| Subdomain { part: 0, region: Region::List(Vec::new()), worker })
                 .collect();
-            let node_owners = NodeOwners::new(NODES as usize, vec![1.0; n], &subdomains, &nodes);
+            let node_owners = NodeOwners::new(NODES as usize, vec![Base::of(1.0); n], &subdomains, &nodes);
             let batch = |nodes: &Vec<u32>| {
                 let node = |&global| BatchNode { global, part: 0, mass: 1.0, stiffness: 1.0, share: 1.0 };
                 Some(Batch { nodes: nodes.iter().map(node).collect(), ..Batch::default() })

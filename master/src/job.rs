@@ -28,7 +28,6 @@ mod sorts;
 mod tally;
 #[cfg(test)]
 mod tests;
-mod tree;
 mod turnover;
 mod twice;
 mod verdict;

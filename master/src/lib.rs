@@ -72,5 +72,6 @@ pub mod sort;
 pub mod spool;
 pub mod study;
 pub mod summarise;
+pub mod tree;
 pub mod verify;
 pub mod world;

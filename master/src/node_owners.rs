@@ -7,7 +7,7 @@ use mechanics::{
     rigid,
 };
 
-use crate::decompose::Subdomain;
+use crate::{balance::Base, decompose::Subdomain};
 
 /// Which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
 pub struct NodeOwners {
@@ -15,8 +15,8 @@ pub struct NodeOwners {
     pub owner_subdomain: Vec<u32>,
     /// Worker of that sub-domain.
     pub owner_worker: Vec<u32>,
-    /// What each worker's sub-domains cost in a cycle ([`crate::decompose::work`]).
-    pub work: Vec<f64>,
+    /// What each worker does beside contact ([`crate::decompose::Cut`]).
+    pub bases: Vec<Base>,
     /// Other workers that hold a node, ascending; most nodes have none and no entry.
     others: HashMap<u32, Vec<u32>>,
     /// Nodes that several workers hold, ascending, and behind them the entries of rigid bodies.
@@ -28,8 +28,8 @@ pub struct NodeOwners {
 }
 
 impl NodeOwners {
-    /// From the nodes of each sub-domain (global indices); `work` is what each worker's cost.
-    pub fn new(n_nodes: usize, work: Vec<f64>, subdomains: &[Subdomain], nodes: &[Vec<u32>]) -> Self {
+    /// From the nodes of each sub-domain (global indices); `bases` is what each worker does beside contact.
+    pub fn new(n_nodes: usize, bases: Vec<Base>, subdomains: &[Subdomain], nodes: &[Vec<u32>]) -> Self {
         let mut owner_subdomain = vec![u32::MAX; n_nodes];
         let mut owner_worker = vec![u32::MAX; n_nodes];
         let mut others: HashMap<u32, Vec<u32>> = HashMap::new();
@@ -55,7 +55,7 @@ impl NodeOwners {
             owner_worker,
             standing: Vec::new(),
             slots: Vec::new(),
-            work,
+            bases,
             others,
             shared,
         };
@@ -89,8 +89,8 @@ impl NodeOwners {
     }
 
     fn stand(&mut self) {
-        let mut standing = vec![Standing::default(); self.work.len()];
-        let mut slots = vec![Vec::new(); self.work.len()];
+        let mut standing = vec![Standing::default(); self.bases.len()];
+        let mut slots = vec![Vec::new(); self.bases.len()];
         for (slot, &node) in self.shared.iter().enumerate() {
             for worker in self.holders(node) {
                 let stand = &mut standing[worker as usize];
@@ -109,7 +109,7 @@ impl NodeOwners {
     }
 
     pub fn n_workers(&self) -> usize {
-        self.work.len()
+        self.bases.len()
     }
 
     /// Number of nodes that several workers hold, and of entries of rigid bodies.

@@ -165,7 +165,7 @@ impl Sorter {
                 let weights = contact::cull(&mut units, &self.surface, x, &self.settings, &self.exclusions);
                 let nodes = |unit: &contact::WorkUnit| balance::nodes_of(unit, &self.surface);
                 let fleet = Fleet { speeds: &self.speeds, regions: &self.regions };
-                balance::assign(&units, (&weights, self.costs), fleet, &node_owners.work, (&owner, &nodes))
+                balance::assign(&units, (&weights, self.costs), fleet, &node_owners.bases, (&owner, &nodes))
             }
             Dealing::Weights => balance::assign_by_weight(&units, &self.speeds),
         };

@@ -1,7 +1,7 @@
 //! An estimate of the exchange of partial forces in a cycle, from which follows when the slowest worker ends it.
 //!
-//! Every worker computes its border elements and sends each neighbour a frame, in the order of the workers. A frame costs the processors at
-//! both ends, occupies the wire out of the sender, travels, and occupies the wire into the receiver; those between two regions queue on one
+//! Every worker computes its contact and border elements and sends each neighbour a frame, in the order of the workers. A frame costs the
+//! processors at both ends, occupies the wire out of the sender, travels, and occupies the wire into the receiver; those between two regions queue on one
 //! way before that. Interior elements are computed beside all that. A worker integrates when it has computed all elements and taken in all
 //! frames, and its vote leaves after its frames. It is what [`crate::simulate::virtual_clock`] charges, for one cycle that all begin at once.
 
@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 
 use mechanics::{mesh::Mesh, piece::Region};
 
-use super::{Fleet, Subdomain, grids::Cells, seams::Seams};
-use crate::balance::{Costs, FAR_BYTE};
+use super::{Fleet, Subdomain, grids::Cells};
+use crate::balance::{Base, Costs, FAR_BYTE};
 
 /// Bytes of a frame beside its partial forces.
 const FRAME_BYTES: f64 = 64.0;
@@ -23,12 +23,21 @@ pub struct Held {
     /// Living elements.
     pub elements: f64,
     pub nodes: f64,
+    /// Pairs of nodes and faces.
+    pub pairs: f64,
+    /// Messages that its place in the tree of votes costs.
+    pub votes: f64,
 }
 
 impl Held {
-    /// Element-cycles of elements and nodes.
-    pub fn work(&self, node: f64) -> f64 {
-        node.mul_add(self.nodes, self.elements)
+    /// Element-cycles of elements, nodes and pairs.
+    pub fn work(&self, costs: Costs) -> f64 {
+        costs.node.mul_add(self.nodes, self.before_nodes(costs))
+    }
+
+    /// Element-cycles of what a worker does before it integrates its nodes.
+    fn before_nodes(&self, costs: Costs) -> f64 {
+        costs.pair.mul_add(self.pairs, self.elements)
     }
 }
 
@@ -64,9 +73,8 @@ struct Frame {
 }
 
 impl Exchange {
-    /// Of sub-domains of `n` workers; `seams` say what different parts share.
-    pub fn new(mesh: &Mesh, subdomains: &[Subdomain], n: usize, seams: &Seams) -> Self {
-        let mut shared = seams.between(subdomains);
+    /// Of sub-domains of `n` workers, of which different parts share so much ([`super::seams::Seams::between`]).
+    pub fn new(mesh: &Mesh, subdomains: &[Subdomain], n: usize, mut shared: Vec<Shared>) -> Self {
         for part in subdomains.chunk_by(|one, other| one.part == other.part) {
             shared_in_part(part, &mut shared);
         }
@@ -95,18 +103,10 @@ impl Exchange {
         Self { neighbours, border, node_bytes }
     }
 
-    /// Adds what messages cost: two for each neighbour.
-    pub fn add_messages(&self, mut work: Vec<f64>, message: f64) -> Vec<f64> {
-        for (work, others) in work.iter_mut().zip(&self.neighbours) {
-            *work += 2.0 * message * others.len() as f64;
-        }
-        work
-    }
-
-    /// How many others share nodes with each worker.
-    #[cfg(test)]
-    pub fn neighbours(&self) -> Vec<usize> {
-        self.neighbours.iter().map(Vec::len).collect()
+    /// By worker, ascending: others that share nodes with it.
+    pub fn neighbours(&self) -> Vec<Vec<u32>> {
+        let of = |others: &Vec<(u32, f64)>| others.iter().map(|(other, _)| *other).collect();
+        self.neighbours.iter().map(of).collect()
     }
 
     /// Copies of its nodes that others hold, by worker.
@@ -115,8 +115,8 @@ impl Exchange {
         self.neighbours.iter().map(|others| others.iter().map(|(_, nodes)| nodes).sum()).collect()
     }
 
-    /// When each worker ends a cycle.
-    pub fn ends(&self, held: &[Held], fleet: Fleet<'_>, costs: Costs) -> Vec<f64> {
+    /// What each worker does in a cycle, contact included, and when it ends it.
+    pub fn cycle(&self, held: &[Held], fleet: Fleet<'_>, costs: Costs) -> Vec<Base> {
         let speeds = fleet.speeds;
         let bytes_of = |nodes: f64| self.node_bytes.mul_add(nodes, FRAME_BYTES);
         let handling = |bytes: f64| costs.copy.mul_add(bytes, costs.message);
@@ -126,7 +126,7 @@ impl Exchange {
         for (worker, (((others, border), held), speed)) in
             (0..).zip(self.neighbours.iter().zip(&self.border).zip(held).zip(speeds))
         {
-            let border = overlapping(*border, held.elements) / speed;
+            let border = costs.pair.mul_add(held.pairs, overlapping(*border, held.elements)) / speed;
             let (mut now, mut wire) = (border, 0.0_f64);
             for &(to, nodes) in others {
                 let bytes = bytes_of(nodes);
@@ -141,7 +141,7 @@ impl Exchange {
         pass_between_regions(&mut frames, fleet, costs);
         frames.sort_by(|a, b| a.to.cmp(&b.to).then(a.enters.total_cmp(&b.enters)));
         let mut frames = frames.into_iter().peekable();
-        let mut ends = Vec::with_capacity(speeds.len());
+        let mut cycle = Vec::with_capacity(speeds.len());
         for (worker, ((held, speed), (sent, left, messages))) in (0..).zip(held.iter().zip(speeds).zip(sent))
         {
             let (mut wire, mut done) = (0.0_f64, sent);
@@ -149,11 +149,13 @@ impl Exchange {
                 wire = costs.byte.mul_add(bytes, wire.max(enters));
                 done = done.max(wire) + handling(bytes) / speed;
             }
-            let integrated = done.max(held.elements / speed + messages) + costs.node * held.nodes / speed;
+            let computed = costs.message.mul_add(held.votes, held.before_nodes(costs)) / speed + messages;
+            let nodes = costs.node * held.nodes / speed;
             // Its vote queues behind its frames.
-            ends.push(integrated.max(left));
+            let end = (done.max(computed) + nodes).max(left);
+            cycle.push(Base { busy: (computed + nodes) * speed, end: end * speed });
         }
-        ends
+        cycle
     }
 }
 

@@ -1,7 +1,7 @@
 //! Where structured parts face each other: what their sub-domains exchange if they are on different workers.
 //!
 //! Joined parts share the nodes of their seam. Where parts may touch, a node that faces an element of another worker
-//! is a ghost there, and its forces go both ways as those of a shared node do.
+//! is a ghost there, and its forces go both ways as those of a shared node do; and its pairs take time.
 
 use std::collections::BTreeMap;
 
@@ -38,11 +38,16 @@ struct Place {
     x: [f64; 3],
 }
 
-/// Nodes that are exchanged for one that faces an element of another worker or lies within so many nodes of such, and the most of all for one
-/// that does. On 80 hosts the plates of 1,000,000 elements in blocks send 3.5 MB a cycle for 10,100 that do, and each pair of workers has 110.
-const GHOSTS: f64 = 1.3;
+/// Nodes are exchanged that lie within so many nodes of one that faces an element of another worker, and at most so many for one that does. On
+/// 80 hosts the plates of 1,000,000 elements in blocks send 3.5 MB a cycle for 10,100 that do, and each pair of workers has 110.
 const MARGIN: f64 = 4.0;
 const MOST_GHOSTS: f64 = 5.0;
+
+/// Cells that a unit reaches beyond the cells of the worker that has most of its nodes.
+const UNIT: u32 = 3;
+
+/// Pairs of a node that faces another part, with faces of that: the 20,200 of the plates of 1,000,000 elements have 81,600.
+const CONTACT_PAIRS: f64 = 4.0;
 
 /// How far from a node, in edges of the coarser part, one that faces it lies at most.
 const REACH: f64 = 1.0;
@@ -83,8 +88,9 @@ impl Seams {
         Self { parts, pairs }
     }
 
-    /// Nodes that pairs of workers exchange for what lies on seams between these sub-domains.
-    pub fn between(&self, subdomains: &[Subdomain]) -> Vec<Shared> {
+    /// What lies on seams between these sub-domains of `n` workers: nodes that pairs of workers exchange, and how many pairs of nodes and
+    /// faces each worker looks at in a cycle.
+    pub fn between(&self, subdomains: &[Subdomain], n: usize) -> (Vec<Shared>, Vec<f64>) {
         let owners: Vec<Vec<u32>> =
             self.parts.iter().map(|(part, within)| owners_within(subdomains, *part, within)).collect();
         let owner = |(part, cell): (u32, [u32; 3])| {
@@ -92,12 +98,25 @@ impl Seams {
             owners[at].get(place_in(&self.parts[at].1, cell)).copied()
         };
         let mut shared: BTreeMap<[u32; 2], [f64; 2]> = BTreeMap::new();
-        for Pair { places: [one, other], is_joined } in &self.pairs {
-            if let (Some(one), Some(other)) = (owner(*one), owner(*other))
-                && one != other
-            {
-                let [joined, facing] = shared.entry([one.min(other), one.max(other)]).or_default();
-                *(if *is_joined { joined } else { facing }) += if *is_joined { 1.0 } else { 0.5 };
+        let mut contact = vec![0.0; n];
+        for Pair { places, is_joined } in &self.pairs {
+            let [Some(one), Some(other)] = places.map(owner) else { continue };
+            let mut add = |one: u32, other: u32, [joined, facing]: [f64; 2]| {
+                if one != other {
+                    let shared = shared.entry([one.min(other), one.max(other)]).or_default();
+                    *shared = [shared[0] + joined, shared[1] + facing];
+                }
+            };
+            if *is_joined {
+                add(one, other, [1.0, 0.0]);
+                continue;
+            }
+            // A unit of which two workers own as many nodes is the lower one's.
+            contact[one.min(other) as usize] += CONTACT_PAIRS;
+            add(one, other, [0.0, 0.5]);
+            // Those near it exchange a frame, however few nodes.
+            for near in (0..8).filter_map(|corner| owner(self.shifted(places[1], corner))) {
+                add(one, near, [0.0, 0.0]);
             }
         }
         let of = |(workers, [joined, facing]): ([u32; 2], [f64; 2])| Shared {
@@ -105,14 +124,34 @@ impl Seams {
             nodes: joined + ghosts(facing),
             border: [0.0, 0.0, 0.0, joined + facing],
         };
-        shared.into_iter().map(of).collect()
+        (shared.into_iter().map(of).collect(), contact)
+    }
+
+    /// The place as far from another one of a part as a unit reaches, in one of eight directions; at most at the end of the seam.
+    fn shifted(&self, (part, cell): (u32, [u32; 3]), direction: u32) -> (u32, [u32; 3]) {
+        let Some((_, Cells { low, high })) = self.parts.iter().find(|(p, _)| *p == part as usize) else {
+            return (part, cell);
+        };
+        let shift = |a: usize| {
+            let forward = direction >> a & 1 == 1;
+            if forward { (cell[a] + UNIT).min(high[a] - 1) } else { cell[a].saturating_sub(UNIT).max(low[a]) }
+        };
+        (part, std::array::from_fn(shift))
+    }
+
+    /// How many pairs of nodes and faces each of so many parts has.
+    pub fn pairs_of_parts(&self, n: usize) -> Vec<f64> {
+        let mut pairs = vec![0.0; n];
+        for Pair { places: [one, other], .. } in self.pairs.iter().filter(|pair| !pair.is_joined) {
+            pairs[one.0.min(other.0) as usize] += CONTACT_PAIRS;
+        }
+        pairs
     }
 }
 
-/// Nodes that two workers exchange for so many that face each other: a unit takes a margin around them from both sides, and several workers
-/// hold some of that.
+/// Nodes that two workers exchange for so many that face each other: a unit takes a margin around them from both sides.
 fn ghosts(facing: f64) -> f64 {
-    (MOST_GHOSTS * facing).min(GHOSTS * (facing.sqrt() + 2.0 * MARGIN).powi(2))
+    (MOST_GHOSTS * facing).min((facing.sqrt() + 2.0 * MARGIN).powi(2))
 }
 
 /// Number of a cell among those of a box, I fastest.

@@ -13,7 +13,7 @@ use mechanics::mesh::Mesh;
 use protocol::message::Work;
 
 use crate::{
-    balance::Costs,
+    balance::{Costs, level},
     decompose::{Fleet, Living, Subdomain, Traits, decompose, work},
     incident::Rebalance,
 };
@@ -187,11 +187,11 @@ fn propose(medians: &[[f64; 2]], slowest: f64, shares: &Shares, ground: &Ground<
         ground.traits,
     );
     let elements = work(&layout, n, 0.0, &living);
-    // Contact in elements, dealt out by speed.
+    // Contact in elements, dealt to those that end theirs first.
     let truly: Vec<f64> = (0..n).map(|w| measured[w].unwrap_or(speeds[w] * usual)).collect();
     let contact: f64 = medians.iter().zip(&truly).map(|([_, contact], speed)| contact * speed).sum();
-    let dealt: f64 = speeds.iter().sum();
-    let foreseen = (0..n).map(|w| (elements[w] + contact * speeds[w] / dealt) / truly[w]).fold(0.0, f64::max);
+    let last = elements.iter().zip(&truly).map(|(elements, speed)| elements / speed).fold(0.0, f64::max);
+    let foreseen = level(&truly, &elements, contact).max(last);
     let bound = (elements.iter().sum::<f64>() + contact) / truly.iter().sum::<f64>();
     (slowest > (1.0 + THRESHOLD) * foreseen).then(|| Proposal {
         speeds,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use deck::model::Model;
 use mechanics::{
+    cycle::Plan,
     cycle::Subdomain,
     exact::Quanta,
     mesh::Mesh,
@@ -26,14 +27,13 @@ use super::{
     problem::{Problem, Touching},
     samples::Samples,
     tally::Tally,
-    tree,
     twice::Twice,
     verdict::Account,
     workers::Workers,
 };
 use crate::{
-    balance::INTERACTIONS_PER_ELEMENT,
-    decompose::{self, Fleet, Living, Traits, decompose, held, work},
+    balance::{Base, INTERACTIONS_PER_ELEMENT},
+    decompose::{self, Cut, Fleet, Living, Traits, work},
     event::{Action, Deal, WorkerSpec},
     exchange::Exchange,
     node_owners::NodeOwners,
@@ -41,6 +41,7 @@ use crate::{
     patches,
     snapshot::Snapshot,
     sort::{Gathered, SortBasis, Sorter, What},
+    tree,
 };
 
 impl Job {
@@ -136,17 +137,20 @@ impl Job {
         let alive = alive_in(state);
         let regions = decompose::regions(specs.iter().map(|spec| &*spec.region));
         let fleet = Fleet { speeds: &speeds, regions: &regions };
-        let traits = Traits::of(&model.mesh, &model.setup, alive.as_deref());
-        let layout = decompose(&model.mesh, fleet, costs, traits);
+        let traits = Traits {
+            children: self.options.has_tree(n).then_some(self.options.tree.neighbours),
+            ..Traits::of(&model.mesh, &model.setup, alive.as_deref())
+        };
+        let Cut { subdomains: layout, tree: mut trees, bases } =
+            decompose::cut(&model.mesh, fleet, costs, traits);
         if model.output.workers {
             let owners: Arc<[u32]> = decompose::owners(&model.mesh, &layout).into();
             actions.push(Action::Owners(Arc::clone(&owners)));
             epoch.owners = Some(owners);
         }
         let threads: Vec<u32> = specs.iter().map(|spec| spec.threads).collect();
-        let held = held(&model.mesh, &layout, n, costs, &Living::new(&model.mesh, alive.as_deref()));
         let n_bodies = model.setup.bodies.len() + checkpoint.continuation.formed.len();
-        let dealt = (layout.as_slice(), held);
+        let dealt = (layout.as_slice(), bases);
         let division = Division::new((model, n_bodies), dealt, &threads, problem.touching.as_ref());
         let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
         let dropped =
@@ -197,12 +201,13 @@ impl Job {
             sections: model.output.sections.iter().map(|section| section.cut.clone()).collect(),
             row_cycles: model.output.history_cycles,
         };
-        let mut trees = Vec::new();
-        if self.options.has_tree(n) {
+        if let Some(children) = traits.children.filter(|_| trees.is_empty()) {
             let cycle = elements.iter().sum::<f64>() / speeds.iter().sum::<f64>();
-            trees = tree::tree(&exchange.plans, fleet, self.options.tree.neighbours, (cycle, costs));
-            epoch.root = trees.iter().position(|place| place.parent.is_none());
+            let neighbours = |plan: &Plan| plan.neighbours.iter().map(|other| other.worker).collect();
+            let neighbours: Vec<Vec<u32>> = exchange.plans.iter().map(neighbours).collect();
+            trees = tree::tree(&neighbours, fleet, (children, &[]), (cycle, costs));
         }
+        epoch.root = trees.iter().position(|place| place.parent.is_none());
         let mut sortings = match (&basis, &model.setup.contact) {
             (Some(basis), Some(settings))
                 if patches::are_sorted_by_workers(
@@ -295,7 +300,7 @@ struct Division {
 impl Division {
     fn new(
         (model, n_bodies): (&Model, usize),
-        (layout, work): (&[decompose::Subdomain], Vec<f64>),
+        (layout, bases): (&[decompose::Subdomain], Vec<Base>),
         threads: &[u32],
         touching: Option<&Touching>,
     ) -> Self {
@@ -303,7 +308,7 @@ impl Division {
         let nodes_of: Vec<Vec<u32>> =
             layout.par_iter().map(|place| piece::nodes(&model.mesh, place.part, &place.region)).collect();
         let node_owners =
-            NodeOwners::new(model.mesh.n_nodes(), work, layout, &nodes_of).with_bodies(n_bodies);
+            NodeOwners::new(model.mesh.n_nodes(), bases, layout, &nodes_of).with_bodies(n_bodies);
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut by_worker: Vec<Share> = (0..n).map(|_| Share::default()).collect();
         let regions = blocks(&model.mesh, layout, threads);

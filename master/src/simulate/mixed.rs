@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use crate::{
     balance::{self, Costs},
-    decompose::{Fleet, Living, Subdomain, Traits, decompose, work},
+    decompose::{Cut, Fleet, Living, Subdomain, Traits, cut, decompose, work},
 };
 
 /// Edges of the problems (elements), and the goal of each: time over the bound.
@@ -119,14 +119,14 @@ impl Sorted {
         let Costs { node, pair, .. } = costs;
         let mesh = &self.model.mesh;
         let (fleet, traits) = (Fleet::near(speeds), Traits::of(mesh, &self.model.setup, None));
-        let layout = decompose(mesh, fleet, costs, traits);
+        let Cut { subdomains: layout, bases, .. } = cut(mesh, fleet, costs, traits);
         let living = Living::new(mesh, None);
         let elements = elements_of(&layout, speeds.len());
         let owner = owners(mesh, &layout);
         let owner = |node: u32| owner[self.surface.nodes[node as usize] as usize] as usize;
         let held = work(&layout, speeds.len(), node, &living);
         let nodes = |unit: &WorkUnit| balance::nodes_of(unit, &self.surface);
-        let chosen = balance::assign(&self.units, (&self.weights, costs), fleet, &held, (&owner, &nodes));
+        let chosen = balance::assign(&self.units, (&self.weights, costs), fleet, &bases, (&owner, &nodes));
         let pairs = self.pairs(&chosen, speeds.len());
 
         let slabs = slabs(mesh, speeds);

@@ -12,7 +12,6 @@
 
 use std::collections::VecDeque;
 
-use mechanics::cycle::Plan;
 use protocol::message::Tree;
 
 use crate::{balance::Costs, decompose::Fleet};
@@ -22,12 +21,12 @@ const MOST_CHILDREN: usize = 8;
 /// Children are in proportion to the speed, up to so many times those of a worker of middle speed.
 const MOST_SPEED: f64 = 4.0;
 
-/// By worker: its place in the tree. A hub has at most so many `neighbours` for children; `cycle` is what a cycle takes, in elements of a
-/// worker of speed 1.
-pub(super) fn tree(
-    plans: &[Plan],
+/// By worker: its place in the tree. `neighbours` are those of each; a hub has at most so many (`most`) of them for children. The hubs of a tree
+/// `before` are tried first. `cycle` is what a cycle takes, in elements of a worker of speed 1.
+pub fn tree(
+    neighbours: &[Vec<u32>],
     fleet: Fleet<'_>,
-    neighbours: usize,
+    (most, before): (usize, &[Tree]),
     (cycle, costs): (f64, Costs),
 ) -> Vec<Tree> {
     let speeds = fleet.speeds;
@@ -36,7 +35,7 @@ pub(super) fn tree(
     let middle = sorted[speeds.len() / 2];
     let relative: Vec<f64> = speeds.iter().map(|speed| (speed / middle).min(MOST_SPEED)).collect();
     let mut places = vec![Tree::default(); speeds.len()];
-    let hubs = join_neighbours((plans, fleet), &relative, neighbours, &mut places);
+    let hubs = join_neighbours((neighbours, fleet), &relative, (most, before), &mut places);
     let children = most_children(hubs.len(), cycle, costs);
     let mut roots = Vec::new();
     for region in by_region(hubs, fleet) {
@@ -50,6 +49,16 @@ pub(super) fn tree(
         .flat_map(|place| &mut place.children)
         .for_each(|(child, leaf)| *leaf = is_leaf[*child as usize]);
     places
+}
+
+/// By worker: messages of a cycle that its place in a tree costs, sent and received ones.
+pub fn messages(places: &[Tree]) -> Vec<f64> {
+    let is_hub = |place: &Tree| !place.children.is_empty();
+    let of = |place: &Tree| {
+        let hubs = place.children.iter().filter(|(child, _)| is_hub(&places[*child as usize])).count();
+        if is_hub(place) { 2.0 * (hubs as f64 + 1.0) } else { 0.0 }
+    };
+    places.iter().map(of).collect()
 }
 
 /// Hubs of one region after another, the region with the fastest first, and in each region the fastest first.
@@ -66,19 +75,20 @@ fn by_region(hubs: Vec<usize>, fleet: Fleet<'_>) -> Vec<Vec<usize>> {
 
 /// Makes some workers parents of neighbours in their region, until every worker has a parent or is one; gives those, the fastest first.
 fn join_neighbours(
-    (plans, fleet): (&[Plan], Fleet<'_>),
+    (neighbours, fleet): (&[Vec<u32>], Fleet<'_>),
     relative: &[f64],
-    most: usize,
+    (most, before): (usize, &[Tree]),
     places: &mut [Tree],
 ) -> Vec<usize> {
-    let n = plans.len();
+    let n = neighbours.len();
     let mut is_free = vec![true; n];
     let mut hubs: Vec<usize> = Vec::new();
     let room = |worker: usize| (most as f64 * relative[worker]) as usize;
     let neighbours = |worker: usize| {
-        let neighbours = plans[worker].neighbours.iter().map(|other| other.worker as usize);
+        let neighbours = neighbours[worker].iter().map(|&other| other as usize);
         neighbours.filter(move |&other| fleet.are_near(worker, other))
     };
+    let was_hub = |worker: usize| before.get(worker).is_some_and(|place| !place.children.is_empty());
     while is_free.contains(&true) {
         let free_neighbours =
             |worker: usize| neighbours(worker).filter(|&other| is_free[other]).take(room(worker));
@@ -86,8 +96,10 @@ fn join_neighbours(
         let gain = |worker: usize| (1.0 + free_neighbours(worker).count() as f64) * relative[worker].min(1.0);
         let candidates = (0..n).filter(|&worker| is_free[worker]);
         // The master's own host often is the first, so of equals the last is taken.
-        let order =
-            |&a: &usize, &b: &usize| gain(a).total_cmp(&gain(b)).then(relative[a].total_cmp(&relative[b]));
+        let order = |&a: &usize, &b: &usize| {
+            let again = was_hub(a).cmp(&was_hub(b));
+            again.then(gain(a).total_cmp(&gain(b))).then(relative[a].total_cmp(&relative[b]))
+        };
         let Some(hub) = candidates.max_by(order) else { break };
         let children: Vec<usize> = free_neighbours(hub).collect();
         is_free[hub] = false;
@@ -144,16 +156,13 @@ fn most_children(n: usize, cycle: f64, costs: Costs) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mechanics::cycle::Neighbour;
-
     const COSTS: Costs = Costs { node: 0.09, pair: 1.2, message: 65.0, travel: 310.0, ..Costs::NONE };
 
     /// Workers in a row, each the neighbour of those within `reach`.
-    fn row(n: usize, reach: usize) -> Vec<Plan> {
-        let neighbour = |worker| Neighbour { worker: worker as u32, shared: Vec::new() };
+    fn row(n: usize, reach: usize) -> Vec<Vec<u32>> {
         let near = |worker: usize| {
             let near = (0..n).filter(|&other| other != worker && other.abs_diff(worker) <= reach);
-            Plan { neighbours: near.map(neighbour).collect(), ..Plan::default() }
+            near.map(|other| other as u32).collect()
         };
         (0..n).map(near).collect()
     }
@@ -186,16 +195,16 @@ mod tests {
             let speeds: Vec<f64> = (0..n).map(|w| [0.3, 7.0, 1.9, 0.77, 100.0][(w * w + n) % 5]).collect();
             for cycle in [0.0, 1e3, 1e6] {
                 assert!(
-                    depth(&tree(&row(n, 2), Fleet::near(&speeds), 12, (cycle, COSTS))) <= 8,
+                    depth(&tree(&row(n, 2), Fleet::near(&speeds), (12, &[]), (cycle, COSTS))) <= 8,
                     "{n} workers"
                 );
             }
         }
         assert!(
-            depth(&tree(&row(40, 0), Fleet::near(&[1.0; 40]), 12, (1e6, COSTS))) <= 6,
+            depth(&tree(&row(40, 0), Fleet::near(&[1.0; 40]), (12, &[]), (1e6, COSTS))) <= 6,
             "without neighbours"
         );
-        assert!(depth(&tree(&row(1000, 3), Fleet::near(&[1.0; 1000]), 12, (1e4, COSTS))) <= 9);
+        assert!(depth(&tree(&row(1000, 3), Fleet::near(&[1.0; 1000]), (12, &[]), (1e4, COSTS))) <= 9);
     }
 
     #[test]
@@ -203,11 +212,31 @@ mod tests {
         let speeds: Vec<f64> = (0..60).map(|w| [1.0, 3.0, 0.5][w % 3]).collect();
         let regions: Vec<u32> = (0..60).map(|w| [2, 0, 1][w / 20]).collect();
         let fleet = Fleet { speeds: &speeds, regions: &regions };
-        let places = tree(&row(60, 8), fleet, 12, (1e4, COSTS));
+        let places = tree(&row(60, 8), fleet, (12, &[]), (1e4, COSTS));
         assert!(depth(&places) <= 6);
         let parent = |worker: usize| places[worker].parent.map(|parent| parent as usize);
         let across = (0..60).filter(|&w| parent(w).is_some_and(|parent| regions[parent] != regions[w]));
         assert_eq!(across.count(), 2);
+    }
+
+    #[test]
+    fn hubs_stay_where_they_were_and_their_messages_count() {
+        let near = Fleet::near(&[1.0; 40]);
+        let of = |reach: usize, before: &[Tree]| tree(&row(40, reach), near, (12, before), (1e6, COSTS));
+        let hubs =
+            |places: &[Tree]| (0..40).filter(|&w| !places[w].children.is_empty()).collect::<Vec<usize>>();
+        let wide = of(6, &[]);
+        assert_ne!(hubs(&of(5, &[])), hubs(&wide));
+        let again = of(5, &wide);
+        assert!(hubs(&wide).iter().all(|hub| hubs(&again).contains(hub)), "{:?}", hubs(&again));
+        let messages = messages(&again);
+        let edges = 2.0 * (hubs(&again).len() as f64 - 1.0);
+        assert_eq!(
+            messages.iter().sum::<f64>(),
+            2.0 * edges + 2.0,
+            "each edge of hubs twice, and the master"
+        );
+        assert!((0..40).all(|w| (messages[w] > 0.0) == hubs(&again).contains(&w)));
     }
 
     #[test]
@@ -219,7 +248,7 @@ mod tests {
     #[test]
     fn slow_workers_have_no_children_and_the_root_is_a_fast_one() {
         let speeds = [0.3, 7.0, 7.0, 7.0, 1.9, 1.9, 0.77, 0.77, 0.77];
-        let places = tree(&row(9, 8), Fleet::near(&speeds), 12, (1e6, COSTS));
+        let places = tree(&row(9, 8), Fleet::near(&speeds), (12, &[]), (1e6, COSTS));
         assert!(places[0].children.is_empty());
         let root = places.iter().position(|place| place.parent.is_none());
         assert!(root.is_some_and(|root| speeds[root] == 7.0));
@@ -228,7 +257,7 @@ mod tests {
 
     #[test]
     fn nearly_all_workers_without_children_hang_on_a_neighbour_and_hubs_are_few() {
-        let places = tree(&row(64, 4), Fleet::near(&[1.0; 64]), 12, (1e6, COSTS));
+        let places = tree(&row(64, 4), Fleet::near(&[1.0; 64]), (12, &[]), (1e6, COSTS));
         let leaves = (0..64).filter(|&worker| places[worker].children.is_empty());
         let is_near =
             |&worker: &usize| places[worker].parent.is_some_and(|parent| parent.abs_diff(worker as u32) <= 4);
