@@ -30,8 +30,6 @@ pub struct SessionOptions {
     pub replay: bool,
     /// How votes and orders travel on route direct.
     pub tree: VoteTree,
-    /// Some workers, but not all, share the master's host: its sorts would keep them from computing.
-    pub beside: bool,
     /// What workers say is played from a tape of an emulated cluster, which keeps no pieces: states may lack theirs.
     pub played: bool,
 }

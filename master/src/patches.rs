@@ -19,8 +19,7 @@ use crate::{
 const POSITION_BYTES: f64 = 24.0;
 
 /// Whether workers of these speeds sort what they hold of a surface of `n_nodes`: where the master would not be done within the lag of a
-/// sort, or would keep workers beside it from computing for that. Workers find pairs of nodes and faces alone, on a surface that does not
-/// change, and votes travel by a tree.
+/// sort. Workers find pairs of nodes and faces alone, on a surface that does not change, and votes travel by a tree.
 pub fn are_sorted_by_workers(model: &Model, options: &SessionOptions, speeds: &[f64], n_nodes: f64) -> bool {
     let Some(settings) = &model.setup.contact else { return false };
     let others = settings.edges || settings.erodes || !settings.ties.is_empty();
@@ -28,7 +27,7 @@ pub fn are_sorted_by_workers(model: &Model, options: &SessionOptions, speeds: &[
     let by_master = {
         let cycle = model.mesh.n_elements() as f64 / speeds.iter().sum::<f64>();
         let node = POSITION_BYTES.mul_add(options.costs().byte, SORT_ELEMENTS);
-        !options.beside && n_nodes * node <= (f64::from(model.setup.control.sort_lag) - 0.5) * cycle
+        n_nodes * node <= (f64::from(model.setup.control.sort_lag) - 0.5) * cycle
     };
     let chosen = match options.asked.sort_by {
         SortBy::Master => false,
@@ -137,30 +136,6 @@ pub fn are_sound(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::options::{JobOptions, Route};
-
-    #[test]
-    fn workers_sort_where_the_master_is_too_slow_or_would_keep_those_beside_it_from_computing() {
-        let part = |name: &str, z: f64| {
-            format!(
-                "[[part]]\nname = \"{name}\"\nmaterial = \"LEAD\"\nbox = {{ origin = [0, 0, {z}], size = [20, 20, 20], cells = [20, 20, 20] }}\n"
-            )
-        };
-        let head =
-            "title = \"two\"\nunits = \"cm-g-us\"\n[control]\nend_cycle = 1\n[contact]\ngap_length = 0.1\n";
-        let text = format!("{head}{}{}", part("a", 0.0), part("b", 20.1));
-        let model = deck::read(&text, "two").expect("a good deck");
-        let sort = |beside: bool, sort_by: SortBy, n: usize, nodes: f64| {
-            let asked = JobOptions { route: Some(Route::Direct), sort_by, ..JobOptions::default() };
-            let options = SessionOptions { asked, beside, ..SessionOptions::default() };
-            are_sorted_by_workers(&model, &options, &vec![1.0; n], nodes)
-        };
-        assert!(!sort(false, SortBy::Auto, 8, 100.0), "done within the lag");
-        assert!(sort(false, SortBy::Auto, 8, 1e6));
-        assert!(sort(true, SortBy::Auto, 8, 100.0), "beside a worker");
-        assert!(!sort(true, SortBy::Master, 8, 1e6) && sort(false, SortBy::Workers, 8, 100.0), "as asked");
-        assert!(!sort(true, SortBy::Workers, 4, 1e6), "no tree of four");
-    }
 
     #[test]
     fn workers_around_are_those_whose_boxes_of_parts_that_meet_are_near() {

@@ -167,9 +167,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     // Others may come, or will be back.
     let workers = order.workers_there.max(order.at_work_before.unwrap_or_default());
     let options = SessionOptions::of(&order.options, workers, all_take_peers);
-    let is_shared = beside.contains(&true) && beside.contains(&false);
-    let options =
-        SessionOptions { waits: true, keep, store: true, replay: true, beside: is_shared, ..options };
+    let options = SessionOptions { waits: true, keep, store: true, replay: true, ..options };
     share_with_sorts(&model, &options, &mut specs, &beside);
     if let Some(path) = order.folder.as_ref().filter(|path| path.is_symlink()) {
         let reason = format!("{} is a link; results stay in the spool folder, remove it", path.display());

@@ -145,8 +145,6 @@ impl Scheme {
             },
             dealing: self.dealing,
             costs: dealt_by,
-            // The master's host has a worker too.
-            beside: true,
             ..SessionOptions::default()
         }
     }
