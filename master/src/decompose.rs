@@ -63,7 +63,7 @@ const NEAR: f64 = 1.15;
 /// A shape that ended so many times later than the best is not tried with further groupings.
 const FAR: f64 = 1.5;
 
-/// Boxes that a worker holds of a part at most, in the mean: each has rows of its own, whose ends fill lane sets less well.
+/// Boxes that a worker holds of a part at most, in the mean.
 const MOST_BOXES: usize = 5;
 
 /// With contact, cycles of so many ways of a message are long enough for the estimate.
@@ -72,7 +72,7 @@ const WAYS: f64 = 10.0;
 /// Shares that are corrected come as near to what they are to be as so much of the time of a message.
 const FINEST: f64 = 0.25;
 
-/// Workers wait for wires if they end so many times later than their work alone takes.
+/// Workers wait if the last ends so many times later than all would by their work alone, were it even.
 const WAITS: f64 = 1.03;
 
 /// A correction by the ends has to gain so much, as the estimate knows a wire less well than work: of workers of one speed, and of several.
