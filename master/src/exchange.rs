@@ -69,40 +69,45 @@ impl Exchange {
         let stride = (if moments { 6 } else { 3 }) + n_history;
         let empty = Plan { moments, n_history: n_history as u32, ..Plan::default() };
         let mut plans: Vec<Plan> = vec![empty; node_owners.n_workers()];
-        // Ghosts: node and worker.
-        let mut ghosts: Vec<(u32, u32)> = Vec::new();
+        // Nodes, each with the workers that have it as a ghost: runs that ascend, which a stable sort merges.
+        let mut ghosts: Vec<(u32, u32)> = Vec::with_capacity(ghosts_of.iter().map(Vec::len).sum());
         for (worker, nodes) in (0..).zip(ghosts_of) {
             ghosts.extend(nodes.iter().map(|&node| (node, worker)));
         }
-        ghosts.sort_unstable();
+        ghosts.sort();
         let mut added = vec![Added::default(); plans.len()];
+        for (plan, nodes) in plans.iter_mut().zip(ghosts_of) {
+            plan.ghosts.reserve(nodes.len());
+        }
+        let mut sources: Vec<Vec<(u32, u32)>> =
+            ghosts_of.iter().map(|nodes| Vec::with_capacity(nodes.len())).collect();
         // On route master: added nodes and their slots.
         let mut new_slots: Vec<Vec<(u32, u32)>> = vec![Vec::new(); plans.len()];
         let mut n_slots = node_owners.n_shared() as u32;
         for ghosts in ghosts.chunk_by(|one, other| one.0 == other.0) {
             let node = ghosts[0].0;
             let owner = node_owners.owner_worker[node as usize];
-            plans[owner as usize].send.push(node);
-            let stands = node_owners.has_several(node);
-            if !stands {
+            let others = node_owners.others(node);
+            let send = &mut plans[owner as usize].send;
+            let at = send.len() as u32;
+            send.push(node);
+            if others.is_empty() {
                 added[owner as usize].nodes.push(node);
             }
             if route == Route::Master {
                 let slot = node_owners.slot(node).unwrap_or(n_slots);
-                if !stands {
+                if others.is_empty() {
                     new_slots[owner as usize].push((node, slot));
                     n_slots += 1;
                 }
                 ghosts.iter().for_each(|&(_, ghost)| new_slots[ghost as usize].push((node, slot)));
             }
+            let (mass, constraint) = (state.mass[node as usize], state.constraint[node as usize]);
             for &(_, ghost) in ghosts {
-                plans[ghost as usize].ghosts.push(Ghost {
-                    node,
-                    mass: state.mass[node as usize],
-                    constraint: state.constraint[node as usize],
-                });
+                plans[ghost as usize].ghosts.push(Ghost { node, mass, constraint });
+                sources[ghost as usize].push((owner, at));
                 added[ghost as usize].nodes.push(node);
-                for holder in node_owners.holders(node) {
+                for &holder in std::iter::once(&owner).chain(others) {
                     added[ghost as usize].with.push((node, holder));
                     added[holder as usize].with.push((node, ghost));
                 }
@@ -124,19 +129,6 @@ impl Exchange {
                 plan.neighbours.clear();
             }
         }
-        let sources: Vec<Vec<(u32, u32)>> = plans
-            .iter()
-            .map(|plan| {
-                plan.ghosts
-                    .iter()
-                    .map(|ghost| {
-                        let owner = node_owners.owner_worker[ghost.node as usize];
-                        let at = plans[owner as usize].send.partition_point(|&n| n < ghost.node);
-                        (owner, at as u32)
-                    })
-                    .collect()
-            })
-            .collect();
         if route == Route::Direct {
             hand_over(&mut plans, &sources);
         }
@@ -212,17 +204,22 @@ impl Exchange {
 
 /// Says who gives whom the state of ghosts, from where each comes: worker and position in its send list.
 fn hand_over(plans: &mut [Plan], sources: &[Vec<(u32, u32)>]) {
-    let enter = |list: &mut Vec<Handed>, worker: u32, place: u32| match list
-        .iter_mut()
-        .find(|of| of.worker == worker)
-    {
-        Some(of) => of.places.push(place),
-        None => list.push(Handed { worker, places: vec![place] }),
-    };
+    /// Enters a place in the list of a worker, which is often the one that was found `before`.
+    fn enter(list: &mut Vec<Handed>, before: &mut usize, worker: u32, place: u32) {
+        if list.get(*before).is_none_or(|of| of.worker != worker) {
+            *before = list.iter().position(|of| of.worker == worker).unwrap_or_else(|| {
+                list.push(Handed { worker, places: Vec::new() });
+                list.len() - 1
+            });
+        }
+        list[*before].places.push(place);
+    }
+    let mut gives_before = vec![0; plans.len()];
     for (worker, sources) in (0..).zip(sources) {
+        let mut takes_before = 0;
         for (ghost, &(owner, at)) in (0..).zip(sources) {
-            enter(&mut plans[worker as usize].takes, owner, ghost);
-            enter(&mut plans[owner as usize].gives, worker, at);
+            enter(&mut plans[worker as usize].takes, &mut takes_before, owner, ghost);
+            enter(&mut plans[owner as usize].gives, &mut gives_before[owner as usize], worker, at);
         }
     }
 }

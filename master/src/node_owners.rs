@@ -1,7 +1,5 @@
 //! Which workers hold which nodes in their sub-domains, and who owns them. Fixed between two decompositions.
 
-use std::collections::HashMap;
-
 use mechanics::{
     cycle::{Standing, standing::share},
     rigid,
@@ -17,10 +15,14 @@ pub struct NodeOwners {
     pub owner_worker: Vec<u32>,
     /// What each worker does beside contact ([`crate::decompose::Cut`]).
     pub bases: Vec<Base>,
-    /// Other workers that hold a node, ascending; most nodes have none and no entry.
-    others: HashMap<u32, Vec<u32>>,
     /// Nodes that several workers hold, ascending, and behind them the entries of rigid bodies.
     shared: Vec<u32>,
+    /// By such node: where the workers beside its owner begin in `others`, and behind the last where they end.
+    firsts: Vec<u32>,
+    /// Those workers, ascending by node.
+    others: Vec<u32>,
+    /// By node, a bit: whether several workers hold it. Most nodes have one holder, and are not looked for then.
+    several: Vec<u64>,
     /// By worker: what of the exchange stays the same in all plans.
     pub standing: Vec<Standing>,
     /// By worker: the place of each of those nodes among the nodes that several workers hold.
@@ -32,7 +34,8 @@ impl NodeOwners {
     pub fn new(n_nodes: usize, bases: Vec<Base>, subdomains: &[Subdomain], nodes: &[Vec<u32>]) -> Self {
         let mut owner_subdomain = vec![u32::MAX; n_nodes];
         let mut owner_worker = vec![u32::MAX; n_nodes];
-        let mut others: HashMap<u32, Vec<u32>> = HashMap::new();
+        // Nodes, each with a worker that holds it beside its owner.
+        let mut pairs: Vec<(u32, u32)> = Vec::new();
         for (id, (subdomain, nodes)) in subdomains.iter().zip(nodes).enumerate() {
             let worker = subdomain.worker as u32;
             for &node in nodes {
@@ -41,23 +44,33 @@ impl NodeOwners {
                     *owner = id as u32;
                     owner_worker[node as usize] = worker;
                 } else if owner_worker[node as usize] != worker {
-                    let list = others.entry(node).or_default();
-                    if let Err(at) = list.binary_search(&worker) {
-                        list.insert(at, worker);
-                    }
+                    pairs.push((node, worker));
                 }
             }
         }
-        let mut shared: Vec<u32> = others.keys().copied().collect();
-        shared.sort_unstable();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let (mut shared, mut firsts) = (Vec::new(), Vec::new());
+        let mut several = vec![0; n_nodes.div_ceil(64)];
+        for (first, &(node, _)) in (0..).zip(&pairs) {
+            if shared.last() != Some(&node) {
+                shared.push(node);
+                firsts.push(first);
+                several[node as usize / 64] |= 1 << (node % 64);
+            }
+        }
+        firsts.push(pairs.len() as u32);
+        let others = pairs.into_iter().map(|(_, worker)| worker).collect();
         let mut node_owners = Self {
             owner_subdomain,
             owner_worker,
             standing: Vec::new(),
             slots: Vec::new(),
             bases,
-            others,
             shared,
+            firsts,
+            others,
+            several,
         };
         node_owners.stand();
         node_owners
@@ -122,15 +135,18 @@ impl NodeOwners {
         self.shared.binary_search(&node).ok().map(|slot| slot as u32)
     }
 
-    /// Whether sub-domains of several workers have the node.
-    pub fn has_several(&self, node: u32) -> bool {
-        self.others.contains_key(&node)
+    /// Workers beside its owner whose sub-domains have the node, ascending.
+    pub fn others(&self, node: u32) -> &[u32] {
+        if self.several[node as usize / 64] >> (node % 64) & 1 == 0 {
+            return &[];
+        }
+        let at = self.shared.partition_point(|&other| other < node);
+        &self.others[self.firsts[at] as usize..self.firsts[at + 1] as usize]
     }
 
     /// Workers whose sub-domains have the node, its owner first.
     pub fn holders(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
-        let others = self.others.get(&node).map_or(&[][..], Vec::as_slice);
-        std::iter::once(self.owner_worker[node as usize]).chain(others.iter().copied())
+        std::iter::once(self.owner_worker[node as usize]).chain(self.others(node).iter().copied())
     }
 
     /// Whether a sub-domain of the worker has the node.
