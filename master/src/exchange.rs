@@ -49,25 +49,36 @@ impl Exchange {
             nodes
         });
         let ghosts: Vec<Vec<u32>> = ghosts.collect();
-        let mut exchange = Self::with_ghosts(node_owners, &ghosts, state, (route, true));
+        let mut exchange = Self::with_ghosts(node_owners, &ghosts, state, route);
         for (plan, batch) in exchange.plans.iter_mut().zip(batches) {
             plan.batch = batch;
         }
         exchange
     }
 
-    /// Plans for these ghosts by worker, ascending nodes that it does not hold, without batches. Where they are not to be `whole`, which is
-    /// on route direct, they say only what ghosts add to the exchange that stands.
-    pub fn with_ghosts(
+    /// Plans on route direct that workers complete among themselves after their sorts of a gathering.
+    pub fn of_workers(n: usize, gathered: u64, state: &GlobalState) -> Self {
+        Self {
+            plans: vec![empty_plan(state); n],
+            hash: gathered,
+            route: Route::Direct,
+            stride: empty_plan(state).stride(),
+            n_history: state.contact.len(),
+            n_slots: 0,
+            slots: vec![Vec::new(); n],
+            sources: vec![Vec::new(); n],
+        }
+    }
+
+    /// Plans for these ghosts by worker, ascending nodes that it does not hold, without batches.
+    fn with_ghosts(
         node_owners: &NodeOwners,
         ghosts_of: &[Vec<u32>],
         state: &GlobalState,
-        (route, whole): (Route, bool),
+        route: Route,
     ) -> Self {
-        let moments = !state.shells.inertia.is_empty();
-        let n_history = state.contact.len();
-        let stride = (if moments { 6 } else { 3 }) + n_history;
-        let empty = Plan { moments, n_history: n_history as u32, ..Plan::default() };
+        let empty = empty_plan(state);
+        let (stride, n_history) = (empty.stride(), state.contact.len());
         let mut plans: Vec<Plan> = vec![empty; node_owners.n_workers()];
         // Nodes, each with the workers that have it as a ghost: runs that ascend, which a stable sort merges.
         let mut ghosts: Vec<(u32, u32)> = Vec::with_capacity(ghosts_of.iter().map(Vec::len).sum());
@@ -117,10 +128,6 @@ impl Exchange {
         }
         let mut slots = vec![Vec::new(); plans.len()];
         for (worker, (plan, added)) in plans.iter_mut().zip(added).enumerate() {
-            if !whole {
-                plan.added = Some(added);
-                continue;
-            }
             let standing = &node_owners.standing[worker];
             (plan.exchange, plan.neighbours) = standing.with(&added);
             if route == Route::Master {
@@ -202,6 +209,12 @@ impl Exchange {
     }
 }
 
+/// A plan without nodes: it says what travels for each.
+fn empty_plan(state: &GlobalState) -> Plan {
+    let moments = !state.shells.inertia.is_empty();
+    Plan { moments, n_history: state.contact.len() as u32, ..Plan::default() }
+}
+
 /// Says who gives whom the state of ghosts, from where each comes: worker and position in its send list.
 fn hand_over(plans: &mut [Plan], sources: &[Vec<(u32, u32)>]) {
     /// Enters a place in the list of a worker, which is often the one that was found `before`.
@@ -243,7 +256,6 @@ fn hash(plans: &[Plan]) -> u64 {
     for plan in plans {
         eat(plan.exchange.len() as u32);
         plan.exchange.iter().copied().for_each(&mut eat);
-        plan.added.iter().flat_map(|added| &added.nodes).copied().for_each(&mut eat);
         eat(plan.send.len() as u32);
         plan.send.iter().copied().for_each(&mut eat);
         eat(plan.ghosts.len() as u32);

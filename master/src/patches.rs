@@ -3,7 +3,10 @@
 use std::collections::BTreeSet;
 
 use deck::model::Model;
-use mechanics::contact::{Exclusions, PartBox, Patch, Settings, Surface, patch};
+use mechanics::{
+    contact::{Exclusions, PartBox, Patch, Settings, Surface, patch},
+    state::GlobalState,
+};
 use protocol::{
     message::{Around, Sorting},
     options::SortBy,
@@ -38,14 +41,14 @@ pub fn are_sorted_by_workers(model: &Model, options: &SessionOptions, speeds: &[
 }
 
 /// What each worker needs to sort the nodes that it owns. `owners` gives the worker of every element, `gather` by worker the global
-/// surface nodes that it owns, `x` the position of every surface node, and `mass` the mass of a global node.
+/// surface nodes that it owns, and `state` has positions, masses and constraints.
 pub fn cut(
     surface: &Surface,
     (settings, exclusions): (&Settings, &Exclusions),
-    (owners, gather): (&[u32], &[Vec<u32>]),
-    x: &[[f64; 3]],
-    mass: &dyn Fn(u32) -> f64,
+    (owners, gather, node_owners): (&[u32], &[Vec<u32>], &NodeOwners),
+    state: &GlobalState,
 ) -> Vec<Sorting> {
+    let mass = |node: u32| state.mass[node as usize];
     let n = gather.len();
     let mut faces: Vec<Vec<u32>> = vec![Vec::new(); n];
     for (f, face) in (0..).zip(&surface.faces) {
@@ -67,16 +70,23 @@ pub fn cut(
     let mut boxes = Vec::with_capacity(n);
     let mut sortings: Vec<Sorting> = (0..n)
         .map(|worker| {
-            let patch = Patch::of(surface, &of_worker[worker], &faces[worker], mass);
+            let patch = Patch::of(surface, &of_worker[worker], &faces[worker], &mass);
             let index = |global: u32| surface.node_index(global).unwrap_or_default() as usize;
-            let at: Vec<[f64; 3]> = patch.nodes.iter().map(|node| x[index(node.global)]).collect();
+            let at: Vec<[f64; 3]> = patch.nodes.iter().map(|node| state.x[node.global as usize]).collect();
             let is_sorted = |global: u32| sorts_node[index(global)] == worker as u32;
             let sorted = (0..).zip(&patch.nodes).filter(|(_, node)| is_sorted(node.global));
             let sorted = sorted.map(|(at, _)| at).collect();
             boxes.push(patch.boxes(&at));
             let mut excluded = std::mem::take(&mut excluded[worker]);
             excluded.sort_unstable();
-            Sorting { patch, sorted, excluded, ..Sorting::default() }
+            let constrained =
+                patch.nodes.iter().map(|node| (node.global, state.constraint[node.global as usize]));
+            let constraints = constrained.filter(|(_, constraint)| *constraint != 0).collect();
+            let standing = node_owners.standing[worker].clone();
+            let is_surface = |&at: &u32| surface.node_index(standing.nodes[at as usize]).is_some();
+            let beside = standing.neighbours.iter().filter(|other| other.shared.iter().any(is_surface));
+            let beside = beside.map(|other| other.worker).collect();
+            Sorting { patch, sorted, excluded, standing, beside, constraints, around: Vec::new() }
         })
         .collect();
     for (sorting, around) in sortings.iter_mut().zip(around(&boxes, settings)) {
@@ -114,21 +124,9 @@ pub fn around(boxes: &[Vec<PartBox>], settings: &Settings) -> Vec<Vec<Around>> {
     near.into_iter().map(|workers| workers.iter().map(around).collect()).collect()
 }
 
-/// Whether a worker's ghosts and boxes can be such: ascending, nodes and parts that there are, and no node that it holds.
-pub fn are_sound(
-    (worker, ghosts): (u32, &[u32]),
-    boxes: &[PartBox],
-    node_owners: &NodeOwners,
-    n_parts: usize,
-) -> bool {
-    let n_nodes = node_owners.owner_worker.len();
-    let is_ghost = |&node: &u32| {
-        let there_is = (node as usize) < n_nodes && node_owners.owner_worker[node as usize] != u32::MAX;
-        there_is && !node_owners.holds(worker, node)
-    };
-    ghosts.is_sorted_by(|a, b| a < b)
-        && ghosts.iter().all(is_ghost)
-        && boxes.is_sorted_by(|a, b| a.part < b.part)
+/// Whether a worker's boxes can be such: ascending, of parts that there are, with corners that are numbers.
+pub fn are_sound(boxes: &[PartBox], n_parts: usize) -> bool {
+    boxes.is_sorted_by(|a, b| a.part < b.part)
         && boxes.iter().all(|of| (of.part as usize) < n_parts)
         && boxes.iter().flat_map(|of| of.low.iter().chain(&of.high)).all(|x| x.is_finite())
 }

@@ -55,11 +55,11 @@ pub enum What {
 }
 
 impl Gathered {
-    /// Number of surface nodes that the master sorts, or of ghosts that workers ask for.
+    /// Number of surface nodes that the master sorts, or of boxes of workers' patches.
     pub fn n_nodes(&self) -> usize {
         match &self.what {
             What::Positions(x) => x.len(),
-            What::Patches(patches) => patches.iter().map(|patch| patch.ghosts.len()).sum(),
+            What::Patches(patches) => patches.iter().map(|patch| patch.boxes.len()).sum(),
         }
     }
 }
@@ -155,7 +155,7 @@ impl Sorter {
     pub fn run(&self, epoch: u32, of: &Gathered, node_owners: &NodeOwners, state: &GlobalState) -> Sorted {
         let x = match &of.what {
             What::Positions(x) => x,
-            What::Patches(patches) => return self.plan(epoch, of.cycle, patches, node_owners, state),
+            What::Patches(patches) => return self.plan(epoch, of.cycle, patches, state),
         };
         let mut units = contact::sort(&self.surface, x, &self.settings, &self.exclusions);
         let census = Census::of(&units);
@@ -187,23 +187,15 @@ impl Sorter {
         Sorted { epoch, gathered: of.cycle, exchange, census, interactions, around: Vec::new() }
     }
 
-    /// The plan that follows from what workers have sorted.
-    fn plan(
-        &self,
-        epoch: u32,
-        gathered: u64,
-        patches: &[SortedPatch],
-        node_owners: &NodeOwners,
-        state: &GlobalState,
-    ) -> Sorted {
+    /// What the master adds to plans that workers have made: who is around whom from now on.
+    fn plan(&self, epoch: u32, gathered: u64, patches: &[SortedPatch], state: &GlobalState) -> Sorted {
         let mut census = Census::default();
         patches.iter().for_each(|patch| census.merge(&patch.census));
-        let ghosts: Vec<Vec<u32>> = patches.iter().map(|patch| patch.ghosts.clone()).collect();
         let boxes: Vec<_> = patches.iter().map(|patch| patch.boxes.clone()).collect();
         Sorted {
             epoch,
             gathered,
-            exchange: Exchange::with_ghosts(node_owners, &ghosts, state, (self.route, false)),
+            exchange: Exchange::of_workers(patches.len(), gathered, state),
             census,
             interactions: patches.iter().map(|patch| patch.census.interactions).collect(),
             around: patches::around(&boxes, &self.settings),

@@ -35,7 +35,7 @@ use std::fmt;
 /// 18: workers may sort what they hold of the surface.
 /// 19: pieces travel before the assignment or state that they belong to.
 /// 20: workers may name the region that they are in.
-pub const VERSION: u16 = 20;
+pub const VERSION: u16 = 21;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

@@ -142,6 +142,13 @@ pub enum Said {
     Orders(Orders),
     /// To a worker around, where the cycle gathers and workers [sort](Sorting) themselves: the faces that may be near its nodes.
     Patch(PlacedPatch),
+    /// To each worker around, when the sender has sorted a gathering: nodes of their patch that it will have as ghosts, ascending.
+    Wants(Vec<u32>),
+    /// To each worker [beside](Sorting::beside) it, when all around have said what they want of it: nodes that both hold, ascending, and who
+    /// wants each.
+    Asked(Vec<(u32, u32)>),
+    /// To each worker that wants nodes, when all beside have said what they were asked for.
+    Shares(Shares),
     /// At the cycle where a plan starts to act: state of the ghosts that the sender owns, as in [`ToWorker::Transfer`].
     Transfer(Vec<f64>),
 }
@@ -153,7 +160,19 @@ pub enum SaidKind {
     Votes,
     Orders,
     Patch,
+    Wants,
+    Asked,
+    Shares,
     Transfer,
+}
+
+/// What a worker is told of the nodes that it wants as ghosts.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shares {
+    /// Nodes that are constrained, ascending, and the index of each one's constraint.
+    pub constraints: Vec<(u32, u16)>,
+    /// Nodes, ascending, and a worker that will have each beside the sender and the receiver.
+    pub with: Vec<(u32, u32)>,
 }
 
 /// What partial forces carry along for the tree.
@@ -194,13 +213,17 @@ impl Said {
             Self::Votes(_) => SaidKind::Votes,
             Self::Orders(_) => SaidKind::Orders,
             Self::Patch(_) => SaidKind::Patch,
+            Self::Wants(_) => SaidKind::Wants,
+            Self::Asked(_) => SaidKind::Asked,
+            Self::Shares(_) => SaidKind::Shares,
             Self::Transfer(_) => SaidKind::Transfer,
         }
     }
 
     /// Whether a worker in cycle `now` may hear this of `cycle`. Neighbours are at most a cycle apart. A vote is waited for by the
     /// orders that both need two cycles later, and those go to workers that have sent theirs. Who sends a patch or the state of
-    /// ghosts is about to do what others need of its cycle, and any two workers are at most two cycles apart.
+    /// ghosts is about to do what others need of its cycle, and any two workers are at most two cycles apart. What is said of the
+    /// ghosts of a gathering takes as long as its plan may.
     pub const fn is_near(&self, cycle: u64, now: u64) -> bool {
         let ahead = cycle.wrapping_sub(now);
         match self.kind() {
@@ -208,6 +231,9 @@ impl Said {
             SaidKind::Votes => ahead.wrapping_add(1) <= 3,
             SaidKind::Orders => now.wrapping_sub(cycle) <= 1,
             SaidKind::Patch | SaidKind::Transfer => ahead.wrapping_add(3) <= 5,
+            SaidKind::Wants | SaidKind::Asked | SaidKind::Shares => {
+                now.wrapping_sub(cycle).wrapping_add(2) <= u32::MAX as u64
+            }
         }
     }
 
@@ -219,7 +245,12 @@ impl Said {
                 Aboard::Vote(votes) => Some(votes),
                 Aboard::Orders(_) => None,
             },
-            Self::Orders(_) | Self::Patch(_) | Self::Transfer(_) => None,
+            Self::Orders(_)
+            | Self::Patch(_)
+            | Self::Wants(_)
+            | Self::Asked(_)
+            | Self::Shares(_)
+            | Self::Transfer(_) => None,
         }
     }
 }
@@ -285,6 +316,10 @@ pub struct Sorting {
     pub around: Vec<Around>,
     /// The exchange that ghosts of later plans add to.
     pub standing: Standing,
+    /// The workers that hold nodes of the surface too, ascending.
+    pub beside: Vec<u32>,
+    /// Patch nodes (global, ascending) that are constrained, and the index of each one's constraint.
+    pub constraints: Vec<(u32, u16)>,
 }
 
 /// A worker whose patch may come near, until the lists of another sort are in force.
@@ -296,12 +331,10 @@ pub struct Around {
     pub boxes: Vec<PartBox>,
 }
 
-/// What came of a worker's sort, for the master to make plans of.
+/// What came of a worker's sort, for the master, when it knows with whom it shares which nodes by the plan to come.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SortedPatch {
-    /// Global nodes of its units that none of its sub-domains has, ascending.
-    pub ghosts: Vec<u32>,
-    /// Surface nodes that it sorted, and all that it looked at, with those of other workers' faces.
+    /// Surface nodes that it sorted, and all that it looked at, with those of other workers' faces and its ghosts again.
     pub nodes: [u64; 2],
     /// Of its units.
     pub census: Census,

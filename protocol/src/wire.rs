@@ -10,7 +10,7 @@ use crate::{
     Error, Result,
     codec::{self, MESSAGE_LIMIT},
     frame::{CHUNK, CHUNK_PREFIX, CONTROL_LIMIT, HEADER_LEN, Kind},
-    message::{Aboard, BranchVote, Orders, Said, ToMaster, ToPeer, ToWorker, Work},
+    message::{Aboard, BranchVote, Orders, Said, Shares, ToMaster, ToPeer, ToWorker, Work},
 };
 
 /// A message ready to be framed.
@@ -81,6 +81,9 @@ enum SaidHead {
     Votes(BranchVote),
     Orders(Orders),
     Patch(PlacedPatch),
+    Wants(Vec<u32>),
+    Asked(Vec<(u32, u32)>),
+    Shares(Shares),
     Transfer,
 }
 
@@ -213,6 +216,9 @@ pub fn pack_to_peer(message: &ToPeer) -> Result<Packed> {
         Said::Votes(votes) => (SaidHead::Votes(votes.clone()), &[]),
         Said::Orders(orders) => (SaidHead::Orders(orders.clone()), &[]),
         Said::Patch(patch) => (SaidHead::Patch(patch.clone()), &[]),
+        Said::Wants(nodes) => (SaidHead::Wants(nodes.clone()), &[]),
+        Said::Asked(nodes) => (SaidHead::Asked(nodes.clone()), &[]),
+        Said::Shares(shares) => (SaidHead::Shares(shares.clone()), &[]),
         Said::Transfer(state) => (SaidHead::Transfer, state),
     };
     let head = codec::encode(&PeerHead { cycle, what })?;
@@ -238,6 +244,9 @@ pub fn unpack_to_peer(kind: Kind, bytes: &[u8]) -> Result<ToPeer> {
         SaidHead::Votes(votes) => Said::Votes(votes),
         SaidHead::Orders(orders) => Said::Orders(orders),
         SaidHead::Patch(patch) => Said::Patch(patch),
+        SaidHead::Wants(nodes) => Said::Wants(nodes),
+        SaidHead::Asked(nodes) => Said::Asked(nodes),
+        SaidHead::Shares(shares) => Said::Shares(shares),
     };
     require_numbers(&numbers, 0)?;
     Ok(ToPeer { cycle, what })

@@ -570,7 +570,7 @@ impl Play {
         // The others follow no plan.
         let known = match which.0 {
             SaidKind::Partials => session.plan_at(message.cycle),
-            SaidKind::Votes | SaidKind::Orders | SaidKind::Patch | SaidKind::Transfer => *plan,
+            _ => *plan,
         };
         let is_early = which.0 == SaidKind::Partials && known.is_none();
         if *epoch > session.epoch() || *epoch > pairs.0 || is_early {

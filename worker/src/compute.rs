@@ -239,9 +239,9 @@ impl Machine {
             Task::Sort { gathered_at, patches } => laps.time(Phase::Contact, || {
                 let sorter = self.sorter.as_mut().ok_or_else(sorter)?;
                 let mark = clock.start();
-                let sorted = Box::new(sorter.sort(gathered_at, &patches, domain)?);
+                let (sorted, wants) = sorter.sort(gathered_at, patches, domain)?;
                 clock.stop(mark, true);
-                Ok::<_, String>(Outcome::Sorted { gathered_at, sorted })
+                Ok::<_, String>(Outcome::Sorted { gathered_at, sorted: Box::new(sorted), wants })
             })?,
             Task::WorkerState { .. } => laps
                 .time(Phase::Other, || Outcome::WorkerState { pieces: domain.pieces(), work: clock.work() }),

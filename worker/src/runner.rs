@@ -137,16 +137,19 @@ impl Runner {
                 if let Some(tree) = &assign.tree {
                     wanted.extend(tree.parent.iter().chain(tree.children.iter().map(|(child, _)| child)));
                 }
-                wanted.extend(assign.sorting.iter().flat_map(|sorting| &sorting.around).map(|a| a.worker));
+                if let Some(sorting) = &assign.sorting {
+                    wanted.extend(
+                        sorting.around.iter().map(|a| a.worker).chain(sorting.beside.iter().copied()),
+                    );
+                }
                 self.links.want(wanted);
                 self.apply(Event::Message(ToWorker::Assign(assign)))
             }
-            ToWorker::Plan { gathered_at, ref plan, ref around, .. } => {
-                let neighbours = plan.neighbours.iter().map(|n| n.worker);
-                let added = plan.added.iter().flat_map(|added| &added.with).map(|&(_, worker)| worker);
-                self.links.want(neighbours.chain(added).chain(around.iter().map(|a| a.worker)));
+            ToWorker::Plan { gathered_at, ref around, .. } => {
+                self.links.want(around.iter().map(|a| a.worker));
                 self.links.settle(gathered_at);
                 self.apply(Event::Message(message))?;
+                self.links.want(self.session.neighbours_to_come());
                 for step in self.links.release(&self.session) {
                     self.step(step)?;
                 }

@@ -7,6 +7,7 @@
 
 mod boundary;
 mod event;
+mod sharing;
 mod sorts;
 mod totals;
 mod tree;
@@ -20,7 +21,7 @@ use protocol::{
 };
 
 use boundary::Coming;
-pub use event::{Action, Event, Outcome, Task};
+pub use event::{Action, Event, Outcome, Task, Wanted};
 use sorts::Sorts;
 use totals::all_finite;
 use tree::Branch;
@@ -229,6 +230,11 @@ impl Session {
         }
     }
 
+    /// The neighbours of plans that do not act yet.
+    pub fn neighbours_to_come(&self) -> impl Iterator<Item = u32> + '_ {
+        self.plans.iter().flat_map(|coming| &coming.plan.neighbours).map(|neighbour| neighbour.worker)
+    }
+
     /// Takes an event, says what to do.
     pub fn apply(&mut self, event: Event) -> Vec<Action> {
         let mut actions = Vec::new();
@@ -331,7 +337,8 @@ impl Session {
                 self.plan_hash = assign.plan_hash;
                 let n_parts = assign.n_parts as usize;
                 self.branch = assign.tree.clone().map(|place| Branch::new(place, n_parts));
-                self.sorts = assign.sorting.as_ref().map(|sorting| Sorts::new(n_parts, sorting));
+                let sorts = assign.sorting.as_ref().map(|sorting| Sorts::new(n_parts, sorting));
+                self.sorts = sorts.transpose()?;
                 self.resumed = assign.cycle > 0;
                 if self.busy {
                     self.next = Some(assign);
@@ -363,7 +370,10 @@ impl Session {
             {
                 Ok(())
             }
-            ToWorker::Plan { gathered_at, acts_at, plan, hash, around } => {
+            ToWorker::Plan { gathered_at, acts_at, mut plan, hash, around } => {
+                if let Some(sorts) = &mut self.sorts {
+                    sorts.complete(gathered_at, &mut plan)?;
+                }
                 if self.plans.len() as u64 > self.sort_lag + 1 {
                     return Err(format!("plan for cycle {acts_at} while {} others wait", self.plans.len()));
                 }
@@ -482,8 +492,8 @@ impl Session {
                 self.spread(patches, actions);
                 self.after_sorting(at_boundary, actions)
             }
-            (Phase::Sorting { at_boundary }, Outcome::Sorted { gathered_at, sorted }) => {
-                actions.push(Action::Send(ToMaster::Sorted { gathered_at, sorted }));
+            (Phase::Sorting { at_boundary }, Outcome::Sorted { gathered_at, sorted, wants }) => {
+                self.want(gathered_at, sorted, wants, actions);
                 self.after_sorting(at_boundary, actions)
             }
             (Phase::Proving, Outcome::Forces { .. }) => {

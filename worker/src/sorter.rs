@@ -8,6 +8,8 @@ use mechanics::{
 };
 use protocol::message::{Around, SortedPatch, Sorting};
 
+use crate::session::Wanted;
+
 /// A worker's patch and its sorts.
 pub struct Sorter {
     settings: Settings,
@@ -88,22 +90,25 @@ impl Sorter {
     pub fn sort(
         &mut self,
         gathered_at: u64,
-        others: &[PlacedPatch],
+        others: Vec<(u32, PlacedPatch)>,
         domain: &Domain,
-    ) -> Result<SortedPatch, String> {
+    ) -> Result<(SortedPatch, Vec<Wanted>), String> {
         let x = self.gathered.get(&gathered_at);
         let x = x.ok_or_else(|| format!("a sort of cycle {gathered_at}, which gathered no positions"))?;
         let (patch, settings) = (&self.patch, &self.settings);
-        let sorted = patch::sort(patch, &self.sorted, x, others, settings, &self.excluded);
-        let nodes = sorted.batch.iter().flat_map(|batch| &batch.nodes).map(|node| node.global);
+        let (from, others): (Vec<u32>, Vec<PlacedPatch>) = others.into_iter().unzip();
+        let sorted = patch::sort(patch, &self.sorted, x, &others, settings, &self.excluded);
+        let nodes = sorted.batch.iter().flat_map(|batch| &batch.nodes);
+        let ghosts: Vec<(u32, f64)> =
+            nodes.filter(|node| !domain.holds(node.global)).map(|node| (node.global, node.mass)).collect();
+        let wants = wanted(&ghosts, from.iter().copied().zip(&others));
         let report = SortedPatch {
-            ghosts: nodes.filter(|&node| !domain.holds(node)).collect(),
-            nodes: [self.sorted.len() as u64, sorted.seen as u64],
+            nodes: [self.sorted.len() as u64, (sorted.seen + wants.len()) as u64],
             census: sorted.census,
             boxes: patch.boxes(x),
         };
         self.batches.insert(gathered_at, sorted.batch);
-        Ok(report)
+        Ok((report, wants))
     }
 
     /// The plan of a gathering begins to act: gives it its batch, and forgets what was before.
@@ -119,4 +124,20 @@ impl Sorter {
         self.batches.retain(|&cycle, _| cycle > gathered_at);
         Ok(())
     }
+}
+
+/// From whom each ghost (node, ascending, and its mass) is wanted: the first whose patch has it.
+fn wanted<'a>(ghosts: &[(u32, f64)], patches: impl Iterator<Item = (u32, &'a PlacedPatch)>) -> Vec<Wanted> {
+    let mut found: Vec<Option<u32>> = vec![None; ghosts.len()];
+    for (from, placed) in patches {
+        let mut nodes = placed.patch.nodes.iter().map(|node| node.global).peekable();
+        for ((ghost, _), found) in ghosts.iter().zip(&mut found) {
+            while nodes.next_if(|node| node < ghost).is_some() {}
+            if found.is_none() && nodes.peek() == Some(ghost) {
+                *found = Some(from);
+            }
+        }
+    }
+    let want = |(&(node, mass), from): (&(u32, f64), Option<u32>)| Some(Wanted { node, mass, from: from? });
+    ghosts.iter().zip(found).filter_map(want).collect()
 }

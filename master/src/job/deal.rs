@@ -218,15 +218,9 @@ impl Job {
                 ) =>
             {
                 let owners = decompose::owners(&model.mesh, &layout);
-                let mass = |node: u32| state.mass[node as usize];
                 let (surface, exclusions) = (basis.sorter.surface(), basis.sorter.exclusions());
-                let x = basis.sorter.positions_of(state);
-                let who = (&owners[..], &division.gather[..]);
-                let mut sortings = patches::cut(surface, (settings, exclusions), who, &x, &mass);
-                for (sorting, standing) in sortings.iter_mut().zip(&basis.node_owners.standing) {
-                    sorting.standing.clone_from(standing);
-                }
-                sortings
+                let who = (&owners[..], &division.gather[..], &*basis.node_owners);
+                patches::cut(surface, (settings, exclusions), who, state)
             }
             _ => Vec::new(),
         };

@@ -157,7 +157,7 @@ pub enum Breach {
         /// Numbers that were expected.
         expected: usize,
     },
-    /// A sort of a cycle with nodes, parts or boxes that cannot be.
+    /// A sort of a cycle with parts or boxes that cannot be.
     NoSort(u64),
     /// State of nodes that move to other workers, in a cycle in which none do.
     TransferWithoutPlan(u64),
@@ -334,7 +334,7 @@ impl Breach {
             }
             Self::NoSort(cycle) => write!(
                 f,
-                "worker {worker} sends a sort of cycle {cycle} with nodes, parts or boxes that there are not"
+                "worker {worker} sends a sort of cycle {cycle} with parts or boxes that there are not"
             ),
             Self::TransferWithoutPlan(cycle) => {
                 write!(f, "worker {worker} transfers nodes at cycle {cycle}, where no plan acts")

@@ -132,9 +132,7 @@ impl Sorts {
         let (Some(all), Some(basis), true) = (&mut self.patches, &self.basis, asked) else {
             return Err(Error::Worker(worker, Breach::Unasked(Sent::Sort, gathered)));
         };
-        let SortedPatch { ghosts, boxes, .. } = &sorted;
-        let n_parts = basis.sorter.n_parts();
-        if !patches::are_sound((worker as u32, ghosts), boxes, &basis.node_owners, n_parts) {
+        if !patches::are_sound(&sorted.boxes, basis.sorter.n_parts()) {
             return Err(Error::Worker(worker, Breach::NoSort(gathered)));
         }
         let of_cycle = all.entry(gathered).or_insert_with(|| vec![None; n]);

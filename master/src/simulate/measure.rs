@@ -15,7 +15,7 @@ use deck::model::Model;
 use mechanics::{cycle::Meter, lanes::Width};
 use protocol::{
     frame::{self, Frame, Header},
-    options::Route,
+    options::{Route, SortBy},
 };
 use serde::Serialize;
 use worker::compute::ThreadClock;
@@ -99,7 +99,8 @@ pub fn once(model: &Arc<Model>, hosts: usize, lanes: Option<Width>) -> Result<Me
         dealt_by: crate::balance::Costs::NONE,
     };
     let run = |hosts: usize| {
-        let scheme = Scheme { lanes, sort_every: Some(SORTS_EVERY), ..Scheme::bolide(Route::Direct) };
+        let (sort_every, sort_by) = (Some(SORTS_EVERY), SortBy::Master);
+        let scheme = Scheme { lanes, sort_every, sort_by, ..Scheme::bolide(Route::Direct) };
         let (_, tape) = pool.install(|| virtual_clock::run(model, &machines(hosts), scheme, None))?;
         tape.ok_or_else(|| "a run that computes keeps a tape".to_owned())
     };

@@ -12,7 +12,7 @@ use mechanics::{
 use protocol::message::{SortedPatch, Work};
 use worker::{
     compute::{Machine, ThreadClock},
-    session::{Outcome, Task},
+    session::{Outcome, Task, Wanted},
 };
 
 use super::timeline::Kind;
@@ -69,7 +69,7 @@ enum Kept {
     Sampled([u8; 16]),
     /// By receiver.
     Spread(Vec<(u32, KeptPatch)>),
-    Sorted(u64, Box<SortedPatch>),
+    Sorted(u64, Box<SortedPatch>, Vec<Wanted>),
 }
 
 /// The size of a patch: a node and a face of it, and how many there are.
@@ -180,7 +180,8 @@ impl Player {
                 // The run that was taped may have ended before this sort, whose plan would act after the end.
                 if let (None, Task::Sort { gathered_at, .. }) = (&next, &task) {
                     let sorted = Box::new(SortedPatch::default());
-                    return Ok((Outcome::Sorted { gathered_at: *gathered_at, sorted }, Load::default()));
+                    let (gathered_at, wants) = (*gathered_at, Vec::new());
+                    return Ok((Outcome::Sorted { gathered_at, sorted, wants }, Load::default()));
                 }
                 let Taped { load, kept, .. } = next.ok_or("the tape of a run is shorter than the run")?;
                 if !kept.answers(&task) {
@@ -204,7 +205,9 @@ fn keep(outcome: &Outcome) -> Result<Kept, String> {
         Outcome::Spread(patches) => {
             Kept::Spread(patches.iter().map(|(to, patch)| (*to, KeptPatch::of(patch))).collect())
         }
-        Outcome::Sorted { gathered_at, sorted } => Kept::Sorted(*gathered_at, sorted.clone()),
+        Outcome::Sorted { gathered_at, sorted, wants } => {
+            Kept::Sorted(*gathered_at, sorted.clone(), wants.clone())
+        }
         Outcome::Failed(reason) => return Err(reason.clone()),
     })
 }
@@ -222,7 +225,7 @@ fn give(kept: Kept) -> Outcome {
         Kept::Spread(patches) => {
             Outcome::Spread(patches.into_iter().map(|(to, patch)| (to, patch.give())).collect())
         }
-        Kept::Sorted(gathered_at, sorted) => Outcome::Sorted { gathered_at, sorted },
+        Kept::Sorted(gathered_at, sorted, wants) => Outcome::Sorted { gathered_at, sorted, wants },
         Kept::WorkerState => Outcome::WorkerState { pieces: Vec::new(), work: Work::default() },
     }
 }

@@ -107,7 +107,7 @@ impl Links {
         }
     }
 
-    /// The plan of a gathering has come: patches of it have arrived.
+    /// The plan of a gathering has come: what was said of its sort has arrived.
     pub fn settle(&mut self, gathered_at: u64) {
         self.pairs.settle(gathered_at);
     }
@@ -216,7 +216,7 @@ impl Links {
         // The others follow no plan.
         let plan = match which.0 {
             SaidKind::Partials => session.plan_at(cycle),
-            SaidKind::Votes | SaidKind::Orders | SaidKind::Patch | SaidKind::Transfer => Some(header.plan),
+            _ => Some(header.plan),
         };
         match plan {
             Some(plan) if plan == header.plan => Ok(Some(message)),

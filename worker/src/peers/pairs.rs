@@ -13,11 +13,15 @@ use protocol::message::{SaidKind, ToPeer};
 const KEPT: usize = 2;
 /// Frames of one kind from one worker that are remembered: those that may come twice, and those after them.
 const REMEMBERED: usize = 4;
-/// Patches may arrive as late as the plan that is made of them is due: [settled](Pairs::settle) ones are kept no longer.
-const PATCHES: usize = 64;
+/// What is said of a sort may arrive as late as the plan that is made of it is due: [settled](Pairs::settle) frames are kept no longer.
+const OF_SORTS: usize = 64;
+
+const fn is_of_sort(kind: SaidKind) -> bool {
+    matches!(kind, SaidKind::Patch | SaidKind::Wants | SaidKind::Asked | SaidKind::Shares)
+}
 
 const fn most(kind: SaidKind, of_cycles: usize) -> usize {
-    if matches!(kind, SaidKind::Patch) { PATCHES } else { of_cycles }
+    if is_of_sort(kind) { OF_SORTS } else { of_cycles }
 }
 
 /// The way to one worker.
@@ -151,10 +155,10 @@ impl<L> Pairs<L> {
         }
     }
 
-    /// The plan of a gathering has come, so everybody has the patches of it and of those before.
+    /// The plan of a gathering has come, so everybody has what was said of its sort and of those before.
     pub fn settle(&mut self, gathered_at: u64) {
         for pair in self.0.values_mut() {
-            pair.kept.retain(|kept| kept.what.kind() != SaidKind::Patch || kept.cycle > gathered_at);
+            pair.kept.retain(|kept| !is_of_sort(kept.what.kind()) || kept.cycle > gathered_at);
         }
     }
 

@@ -38,11 +38,8 @@ impl Session {
         }
         let Some(ghost_state) = self.ghost_state()? else { return Ok(()) };
         let Orders { gather, blocking, .. } = *self.flags()?;
-        if let Some(Coming { gathered_at, hash, mut plan, around, .. }) = self.plans.pop_front() {
+        if let Some(Coming { gathered_at, hash, plan, around, .. }) = self.plans.pop_front() {
             self.boundaries.pop_front();
-            if let Some(sorts) = &self.sorts {
-                sorts.complete(&mut plan)?;
-            }
             self.n_exchange = plan.exchange.len();
             self.neighbours.clone_from(&plan.neighbours);
             self.stride = plan.stride();

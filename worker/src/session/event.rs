@@ -106,9 +106,20 @@ pub enum Task {
     Sort {
         /// The cycle whose positions it is of.
         gathered_at: u64,
-        /// What the workers around have sent.
-        patches: Vec<PlacedPatch>,
+        /// What the workers around have sent, and who.
+        patches: Vec<(u32, PlacedPatch)>,
     },
+}
+
+/// A node of another worker's patch that a sort wants as a ghost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wanted {
+    /// Global node index.
+    pub node: u32,
+    /// Nodal mass.
+    pub mass: f64,
+    /// The worker around whose patch it is of; the first, of several.
+    pub from: u32,
 }
 
 /// What came of a task.
@@ -143,6 +154,8 @@ pub enum Outcome {
         /// The cycle whose positions it was sorted from.
         gathered_at: u64,
         sorted: Box<SortedPatch>,
+        /// By ascending node.
+        wants: Vec<Wanted>,
     },
     /// The task failed: a sentence for the user.
     Failed(String),

@@ -2,9 +2,9 @@
 
 use mechanics::{
     contact::{BatchNode, Patch, PlacedPatch},
-    cycle::{Added, Ghost, Handed, Plan, Standing},
+    cycle::{Ghost, Plan, Standing},
 };
-use protocol::message::{Around, Said, SortedPatch, Sorting, ToPeer, Tree};
+use protocol::message::{Around, Said, Shares, Sorting, ToPeer, Tree};
 
 use super::{
     tests::{assign, done, forces, hear, orders, vote},
@@ -17,7 +17,10 @@ fn gathering() -> Session {
     let neighbours = vec![Neighbour { worker: 1, shared: vec![0] }];
     let around = [1, 2].map(|worker| Around { worker, boxes: Vec::new() }).to_vec();
     let standing = Standing { nodes: vec![4], neighbours: neighbours.clone() };
-    let sorting = Sorting { around, standing, ..Sorting::default() };
+    let node = BatchNode { global: 4, part: 0, mass: 1.0, stiffness: 1.0, share: 1.0 };
+    let patch = Patch { nodes: vec![node], faces: Vec::new() };
+    let (beside, constraints) = (vec![1], vec![(4, 5)]);
+    let sorting = Sorting { patch, around, standing, beside, constraints, ..Sorting::default() };
     let whole = Assign {
         route: Route::Direct,
         plan: Plan { exchange: vec![4], neighbours, ..Plan::default() },
@@ -49,6 +52,11 @@ fn patch(session: &mut Session, from: u32, cycle: u64, patch: PlacedPatch) -> Ve
     session.apply(Event::Peer(from, ToPeer { cycle, what: Said::Patch(patch) }))
 }
 
+/// A worker says something of the ghosts of the gathering of cycle 1.
+fn of_ghosts(session: &mut Session, from: u32, what: Said) -> Vec<Action> {
+    session.apply(Event::Peer(from, ToPeer { cycle: 1, what }))
+}
+
 fn refused(actions: &[Action], why: &str) -> bool {
     matches!(actions, [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains(why))
 }
@@ -69,15 +77,15 @@ fn a_gathering_is_spread_after_the_interior_and_sorted_once_all_around_have_sent
     // What comes meanwhile waits for the end of the sort.
     let partials = Said::Partials { partials: vec![1.0; 3], aboard: None };
     assert!(session.apply(Event::Peer(1, ToPeer { cycle: 1, what: partials })).is_empty());
-    let sorted = Box::new(SortedPatch { ghosts: vec![9], ..SortedPatch::default() });
-    let told = done(&mut session, Outcome::Sorted { gathered_at: 1, sorted });
-    assert!(
-        matches!(
-            told[..],
-            [Action::Send(ToMaster::Sorted { gathered_at: 1, .. }), Action::Compute(Task::Integrate { .. })]
-        ),
-        "{told:?}"
-    );
+    let wants = vec![Wanted { node: 9, mass: 1.0, from: 2 }];
+    let told = done(&mut session, Outcome::Sorted { gathered_at: 1, sorted: Box::default(), wants });
+    let wants_of = |to: u32, nodes: &[u32]| (to, ToPeer { cycle: 1, what: Said::Wants(nodes.to_vec()) });
+    let [Action::SendPeer(a, first), Action::SendPeer(b, second), Action::Compute(Task::Integrate { .. })] =
+        &told[..]
+    else {
+        panic!("{told:?}")
+    };
+    assert_eq!([(*a, first.clone()), (*b, second.clone())], [wants_of(1, &[]), wants_of(2, &[9])]);
 }
 
 #[test]
@@ -94,23 +102,26 @@ fn a_plan_acts_with_ghosts_that_their_owners_send_and_with_the_exchange_that_sta
     assert!(patch(&mut session, 1, 1, PlacedPatch::default()).is_empty());
     let sorts = patch(&mut session, 2, 1, PlacedPatch::default());
     assert!(matches!(sorts[..], [Action::Compute(Task::Sort { gathered_at: 1, .. })]), "{sorts:?}");
-    let plan = Box::new(Plan {
-        ghosts: vec![Ghost { node: 9, mass: 1.0, constraint: 0 }],
-        send: vec![4],
-        gives: vec![Handed { worker: 2, places: vec![0] }],
-        takes: vec![Handed { worker: 2, places: vec![0] }],
-        added: Some(Added { nodes: vec![9], with: vec![(4, 2), (9, 2)] }),
-        ..Plan::default()
-    });
+    let wants = vec![Wanted { node: 9, mass: 2.0, from: 2 }];
+    let asks = done(&mut session, Outcome::Sorted { gathered_at: 1, sorted: Box::default(), wants });
+    assert!(matches!(asks[..], [Action::SendPeer(1, _), Action::SendPeer(2, _)]), "{asks:?}");
+    // Worker 2 wants node 4, which worker 1 is told of, and worker 3 has asked worker 2 for node 9.
+    assert!(of_ghosts(&mut session, 1, Said::Wants(Vec::new())).is_empty());
+    let told = of_ghosts(&mut session, 2, Said::Wants(vec![4]));
+    let [Action::SendPeer(1, asked)] = &told[..] else { panic!("{told:?}") };
+    assert_eq!(asked.what, Said::Asked(vec![(4, 2)]));
+    let told = of_ghosts(&mut session, 1, Said::Asked(Vec::new()));
+    let [Action::SendPeer(2, shares)] = &told[..] else { panic!("{told:?}") };
+    let expected = Shares { constraints: vec![(4, 5)], with: vec![(4, 1)] };
+    assert_eq!(shares.what, Said::Shares(expected));
+    let shares = Shares { constraints: vec![(9, 6)], with: vec![(9, 3)] };
+    let told = of_ghosts(&mut session, 2, Said::Shares(shares));
+    assert!(matches!(told[..], [Action::Send(ToMaster::Sorted { gathered_at: 1, .. })]), "{told:?}");
     let around = vec![Around { worker: 2, boxes: Vec::new() }];
-    assert!(
-        hear(&mut session, ToWorker::Plan { gathered_at: 1, acts_at: 3, plan, hash: 8, around }).is_empty()
-    );
-    let told = done(&mut session, Outcome::Sorted { gathered_at: 1, sorted: Box::default() });
-    assert!(
-        matches!(told[..], [Action::Send(ToMaster::Sorted { .. }), Action::Compute(Task::Transfer { .. })]),
-        "{told:?}"
-    );
+    let plan = Box::default();
+    let told = hear(&mut session, ToWorker::Plan { gathered_at: 1, acts_at: 3, plan, hash: 8, around });
+    let [Action::Compute(Task::Transfer { nodes })] = &told[..] else { panic!("{told:?}") };
+    assert_eq!((&nodes[..], session.neighbours_to_come().collect()), (&[4][..], vec![1, 2, 3]));
     let given = done(&mut session, Outcome::Transferred((0..6).map(f64::from).collect()));
     let [Action::SendPeer(2, state), Action::Compute(Task::Elements { .. })] = &given[..] else {
         panic!("{given:?}")
@@ -123,9 +134,10 @@ fn a_plan_acts_with_ghosts_that_their_owners_send_and_with_the_exchange_that_sta
         panic!("{installs:?}")
     };
     assert_eq!((ghost_state, &plan.exchange), (&vec![7.0; 6], &vec![4, 9]));
+    assert_eq!(plan.ghosts, [Ghost { node: 9, mass: 2.0, constraint: 6 }]);
     let neighbours: Vec<(u32, Vec<u32>)> =
         plan.neighbours.iter().map(|neighbour| (neighbour.worker, neighbour.shared.clone())).collect();
-    assert_eq!(neighbours, [(1, vec![0]), (2, vec![0, 1])]);
+    assert_eq!(neighbours, [(1, vec![0]), (2, vec![0, 1]), (3, vec![1])]);
 }
 
 #[test]

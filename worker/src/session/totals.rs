@@ -78,6 +78,9 @@ impl Session {
             (_, Said::Votes(votes)) => self.add_vote(cycle, Some(from), votes, actions)?,
             (_, Said::Orders(orders)) => self.take_orders(cycle, orders, actions),
             (_, Said::Patch(patch)) => self.hear_patch(from, cycle, patch)?,
+            (_, what @ (Said::Wants(_) | Said::Asked(_) | Said::Shares(_))) => {
+                self.hear_of_ghosts(from, cycle, what, actions)?;
+            }
             (_, Said::Transfer(state)) => {
                 if self.ghosts_heard.insert((cycle, from), state).is_some() {
                     return Err(format!("worker {from} sends the ghosts of cycle {cycle} twice"));

@@ -8,7 +8,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{Added, Domain, Meter, bodies, ghosts::Ghosts, held_block::HeldBlock, touch::Places};
+use super::{Domain, Meter, bodies, ghosts::Ghosts, held_block::HeldBlock, touch::Places};
 use crate::{
     contact::{Batch, BatchNode},
     lanes::SET,
@@ -26,9 +26,6 @@ pub struct Plan {
     pub ghosts: Vec<Ghost>,
     /// Global nodes whose state this worker sends to others when the plan starts to act.
     pub send: Vec<u32>,
-    /// Where workers sort themselves: what ghosts add to the exchange; `exchange` and `neighbours` are empty until the worker has put both
-    /// together ([`Standing::with`](super::Standing::with)).
-    pub added: Option<Added>,
     /// On route direct: to whom each of them goes.
     pub gives: Vec<Handed>,
     /// On route direct: from whom the state of each ghost comes.

@@ -15,7 +15,7 @@ pub struct Standing {
 }
 
 /// What the ghosts of a plan add to the exchange of a worker.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Added {
     /// Global node indices, ascending: its ghosts, and nodes of its own that are ghosts elsewhere.
     pub nodes: Vec<u32>,
