@@ -47,9 +47,9 @@ pub const CONNECTIONS: usize = 1024;
 /// Interval of heartbeats between peers (ms): shorter than the master's, as a link that is given up costs a detour only.
 const HEARTBEAT_MS: u32 = 500;
 
-/// The bounds of a link between workers: at most two cycles are under way.
+/// The bounds of a link between workers: at most two cycles are under way, and of each sort a few frames.
 fn settings() -> Settings {
-    Settings { queued_frames: 8, bulk_messages: 0, ..Settings::default() }
+    Settings { queued_frames: 64, bulk_messages: 0, ..Settings::default() }
 }
 
 /// The listening side of a worker's process, from its start to its end.
