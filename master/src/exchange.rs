@@ -56,7 +56,7 @@ impl Exchange {
         exchange
     }
 
-    /// Plans on route direct that workers complete among themselves after their sorts of a gathering.
+    /// Plans on route direct that workers complete among themselves after their sorts of a gathering, whose cycle stands for a hash.
     pub fn of_workers(n: usize, gathered: u64, state: &GlobalState) -> Self {
         Self {
             plans: vec![empty_plan(state); n],

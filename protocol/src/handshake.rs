@@ -35,6 +35,7 @@ use std::fmt;
 /// 18: workers may sort what they hold of the surface.
 /// 19: pieces travel before the assignment or state that they belong to.
 /// 20: workers may name the region that they are in.
+/// 21: workers that sort make their plans among themselves.
 pub const VERSION: u16 = 21;
 
 /// Most characters of a host's name.

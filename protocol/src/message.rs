@@ -149,7 +149,7 @@ pub enum Said {
     Asked(Vec<(u32, u32)>),
     /// To each worker that wants nodes, when all beside have said what they were asked for.
     Shares(Shares),
-    /// At the cycle where a plan starts to act: state of the ghosts that the sender owns, as in [`ToWorker::Transfer`].
+    /// At the cycle where a plan starts to act: state of the ghosts that the sender gives, as in [`ToWorker::Transfer`].
     Transfer(Vec<f64>),
 }
 

@@ -230,11 +230,6 @@ impl Session {
         }
     }
 
-    /// The neighbours of plans that do not act yet.
-    pub fn neighbours_to_come(&self) -> impl Iterator<Item = u32> + '_ {
-        self.plans.iter().flat_map(|coming| &coming.plan.neighbours).map(|neighbour| neighbour.worker)
-    }
-
     /// Takes an event, says what to do.
     pub fn apply(&mut self, event: Event) -> Vec<Action> {
         let mut actions = Vec::new();

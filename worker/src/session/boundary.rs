@@ -20,6 +20,11 @@ pub(super) struct Coming {
 }
 
 impl Session {
+    /// The neighbours of plans that do not act yet.
+    pub fn neighbours_to_come(&self) -> impl Iterator<Item = u32> + '_ {
+        self.plans.iter().flat_map(|coming| &coming.plan.neighbours).map(|neighbour| neighbour.worker)
+    }
+
     /// At a plan boundary: with the plan in hand the transfer and the elements go first, then, with the ghosts in hand,
     /// the plan is installed.
     pub(super) fn try_boundary(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {

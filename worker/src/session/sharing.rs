@@ -117,6 +117,10 @@ impl Sharing {
         const NOT_COMMON: &str = "names nodes that it does not share, or out of order";
         let is_new = match what {
             Said::Wants(nodes) => {
+                // Who wants something has had the patch that this worker spread.
+                if self.around.as_ref().is_some_and(|around| !around.contains(&from)) {
+                    return Err("comes from a worker that is not around");
+                }
                 let is_here = |node: &u32| held.patch.binary_search(node).is_ok();
                 if !nodes.is_sorted_by(|a, b| a < b) || !nodes.iter().all(is_here) {
                     return Err(NOT_COMMON);

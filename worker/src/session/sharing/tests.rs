@@ -173,4 +173,7 @@ fn what_names_nodes_that_two_do_not_have_in_common_or_comes_twice_or_unasked_is_
     assert_eq!(sharing.hear(&held[0], 1, shares()), Err("answers what was not asked"));
     let stranger = sharing.hear(&held[0], 7, Said::Asked(Vec::new()));
     assert_eq!(stranger, Err("comes from a worker that is not beside"));
+    sharing.spread(vec![1]);
+    let stranger = sharing.hear(&held[0], 7, Said::Wants(Vec::new()));
+    assert_eq!(stranger, Err("comes from a worker that is not around"));
 }
