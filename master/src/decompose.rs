@@ -88,6 +88,8 @@ pub struct Traits<'a> {
     pub alive: Option<&'a [bool]>,
     /// Structured parts that face each other exchange forces of contact.
     pub touch: bool,
+    /// Contact of a node is its owner's, as where workers sort; else a unit of nodes of both sides is one worker's.
+    pub by_node: bool,
     /// An element of any part takes as long as one of any other.
     pub alike: bool,
     /// Most neighbours that are children of a worker in the tree of votes ([`crate::tree`]), if there is one.
@@ -104,7 +106,7 @@ impl<'a> Traits<'a> {
         };
         let are_alike = mesh.parts.windows(2).all(|two| kind(&two[0]) == kind(&two[1]));
         let alike = are_alike && setup.bodies.is_empty() && setup.switches.is_empty();
-        Self { alive, touch: setup.contact.is_some(), alike, children: None }
+        Self { alive, touch: setup.contact.is_some(), by_node: false, alike, children: None }
     }
 }
 
@@ -154,7 +156,7 @@ pub fn cut(mesh: &Mesh, fleet: Fleet<'_>, costs: Costs, traits: Traits<'_>) -> C
     let shapes = if has_choice { SHAPES } else { &SHAPES[..1] };
     let (groupings, by_work) = if n < 3 || equal { (1, 0) } else { (GROUPINGS.min(2 + TRIED / n), BY_WORK) };
     let living = Living::new(mesh, traits.alive);
-    let seams = if has_choice { Seams::new(mesh, traits.touch) } else { Seams::default() };
+    let seams = if has_choice { Seams::new(mesh, traits) } else { Seams::default() };
     let mut sizes = living.of_parts(mesh);
     for (size, pairs) in sizes.iter_mut().zip(seams.pairs_of_parts(mesh.parts.len())) {
         *size += costs.pair * pairs;

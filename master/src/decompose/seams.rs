@@ -10,7 +10,7 @@ use mechanics::{
     piece::Region,
 };
 
-use super::{Subdomain, exchange::Shared, grids::Cells};
+use super::{Subdomain, Traits, exchange::Shared, grids::Cells};
 
 /// Nodes of different parts that are one, or face each other.
 #[derive(Debug, Default)]
@@ -18,9 +18,11 @@ pub struct Seams {
     /// Parts that have some, ascending, and the cells that their places lie in.
     parts: Vec<(usize, Cells)>,
     pairs: Vec<Pair>,
+    /// As in [`Traits`].
+    by_node: bool,
 }
 
-/// A node of a part, and that of another one beside it, each by one of its cells.
+/// A node of a part, and that of another one beside it, each by one of its cells. Of nodes that face each other the first is whose contact it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pair {
     places: [(u32, [u32; 3]); 2],
@@ -53,8 +55,8 @@ const CONTACT_PAIRS: f64 = 4.0;
 const REACH: f64 = 1.0;
 
 impl Seams {
-    /// Of the structured parts of a mesh; nodes face each other if its parts `touch`.
-    pub fn new(mesh: &Mesh, touch: bool) -> Self {
+    /// Of the structured parts of a mesh; nodes face each other if its parts touch.
+    pub fn new(mesh: &Mesh, Traits { touch, by_node, .. }: Traits<'_>) -> Self {
         let structured = |part: &Part| matches!(part.topology, Topology::Structured { .. });
         let known = |part: &Part| !part.nodes.is_empty();
         if mesh.parts.iter().filter(|part| structured(part) && known(part)).count() < 2 {
@@ -85,7 +87,7 @@ impl Seams {
                 None => parts.push((part as usize, Cells { low: cell, high })),
             }
         }
-        Self { parts, pairs }
+        Self { parts, pairs, by_node }
     }
 
     /// What lies on seams between these sub-domains of `n` workers: nodes that pairs of workers exchange, and how many pairs of nodes and
@@ -112,7 +114,8 @@ impl Seams {
                 continue;
             }
             // A unit of which two workers own as many nodes is the lower one's.
-            contact[one.min(other) as usize] += CONTACT_PAIRS;
+            let whose = if self.by_node { one } else { one.min(other) };
+            contact[whose as usize] += CONTACT_PAIRS;
             add(one, other, [0.0, 0.5]);
             // Those near it exchange a frame, however few nodes.
             for near in (0..8).filter_map(|corner| owner(self.shifted(places[1], corner))) {
@@ -143,7 +146,8 @@ impl Seams {
     pub fn pairs_of_parts(&self, n: usize) -> Vec<f64> {
         let mut pairs = vec![0.0; n];
         for Pair { places: [one, other], .. } in self.pairs.iter().filter(|pair| !pair.is_joined) {
-            pairs[one.0.min(other.0) as usize] += CONTACT_PAIRS;
+            let whose = if self.by_node { one.0 } else { one.0.min(other.0) };
+            pairs[whose as usize] += CONTACT_PAIRS;
         }
         pairs
     }

@@ -4,7 +4,8 @@ use super::*;
 use mechanics::mesh::Part;
 use std::collections::HashSet;
 
-const TOUCHING: Traits<'_> = Traits { alive: None, touch: true, alike: false, children: None };
+const TOUCHING: Traits<'_> =
+    Traits { alive: None, touch: true, by_node: false, alike: false, children: None };
 
 const NODE: Costs = Costs { node: 0.1, ..Costs::NONE };
 
@@ -243,7 +244,8 @@ fn parts_that_face_each_other_on_different_workers_exchange_what_lies_on_their_s
     let whole = |part, high, worker| Subdomain { part, region: Region::Cells { low: [0; 3], high }, worker };
     let apart = [whole(0, [2, 2, 3], 0), whole(1, [2, 2, 1], 1)];
     let nodes = |is_joined, touch, subdomains: &[Subdomain]| {
-        let seams = Seams::new(&stack([2, 2, 3], [2, 2, 1], is_joined), touch);
+        let seams =
+            Seams::new(&stack([2, 2, 3], [2, 2, 1], is_joined), Traits { touch, ..Traits::default() });
         seams.between(subdomains, 2).0.iter().map(|shared| shared.nodes).sum::<f64>()
     };
     assert_eq!(nodes(true, false, &apart), 9.0, "joined");
@@ -264,7 +266,7 @@ fn on_slow_wires_parts_that_touch_are_cut_so_that_facing_pieces_stay_together() 
         let costs = Costs { byte: 0.17, ..Costs::default() };
         let subdomains =
             decompose(&mesh, Fleet::near(&[1.0; 16]), costs, Traits { touch, ..Traits::default() });
-        Seams::new(&mesh, true).between(&subdomains, 16).0.iter().map(|shared| shared.nodes).sum::<f64>()
+        Seams::new(&mesh, TOUCHING).between(&subdomains, 16).0.iter().map(|shared| shared.nodes).sum::<f64>()
     };
     assert!(exchanged(true) < 0.2 * exchanged(false), "{} of {}", exchanged(true), exchanged(false));
 }
@@ -401,20 +403,23 @@ fn parts_have_workers_of_their_own_unless_their_materials_have_other_laws() {
 fn workers_whose_elements_face_another_part_get_fewer_and_all_end_at_one_time() {
     let (mesh, n) = (stack([60, 60, 40], [60, 60, 20], false), 40);
     let costs = Costs { byte: 0.017, ..Costs::default() };
-    let traits = Traits { touch: true, alike: true, ..Traits::default() };
-    let cut = cut(&mesh, Fleet::near(&vec![1.0; n]), costs, traits);
-    let pairs = Seams::new(&mesh, true).between(&cut.subdomains, n).1;
-    assert_eq!(pairs.iter().sum::<f64>(), 4.0 * 2.0 * 61.0 * 61.0);
-    let ends: Vec<f64> =
-        cut.bases.iter().zip(&pairs).map(|(base, pairs)| base.end + costs.pair * pairs).collect();
-    let mean = ends.iter().sum::<f64>() / n as f64;
-    assert!(last(&ends) < 1.04 * mean, "{} of {mean}", last(&ends));
-    let elements = shares(&cut.subdomains, n);
-    let of = |faces: bool| {
-        let some: Vec<usize> = (0..n).filter(|&w| (pairs[w] > 0.0) == faces).map(|w| elements[w]).collect();
-        some.iter().sum::<usize>() as f64 / some.len() as f64
-    };
-    assert!(of(true) < 0.95 * of(false), "{} and {}", of(true), of(false));
+    for by_node in [false, true] {
+        let traits = Traits { touch: true, by_node, alike: true, ..Traits::default() };
+        let cut = cut(&mesh, Fleet::near(&vec![1.0; n]), costs, traits);
+        let pairs = Seams::new(&mesh, traits).between(&cut.subdomains, n).1;
+        assert_eq!(pairs.iter().sum::<f64>(), 4.0 * 2.0 * 61.0 * 61.0);
+        let ends: Vec<f64> =
+            cut.bases.iter().zip(&pairs).map(|(base, pairs)| base.end + costs.pair * pairs).collect();
+        let mean = ends.iter().sum::<f64>() / n as f64;
+        assert!(last(&ends) < 1.04 * mean, "{} of {mean}", last(&ends));
+        let elements = shares(&cut.subdomains, n);
+        let of = |faces: bool| {
+            let some: Vec<usize> =
+                (0..n).filter(|&w| (pairs[w] > 0.0) == faces).map(|w| elements[w]).collect();
+            some.iter().sum::<usize>() as f64 / some.len() as f64
+        };
+        assert!(of(true) < 0.95 * of(false), "{} and {}", of(true), of(false));
+    }
 }
 
 #[test]

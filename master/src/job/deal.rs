@@ -137,7 +137,12 @@ impl Job {
         let alive = alive_in(state);
         let regions = decompose::regions(specs.iter().map(|spec| &*spec.region));
         let fleet = Fleet { speeds: &speeds, regions: &regions };
+        let by_workers = problem.touching.as_ref().is_some_and(|touching| {
+            let n_nodes = touching.surface.nodes.len() as f64;
+            patches::are_sorted_by_workers(model, &self.options, &speeds, n_nodes)
+        });
         let traits = Traits {
+            by_node: by_workers,
             children: self.options.has_tree(n).then_some(self.options.tree.neighbours),
             ..Traits::of(&model.mesh, &model.setup, alive.as_deref())
         };
@@ -209,14 +214,7 @@ impl Job {
         }
         epoch.root = trees.iter().position(|place| place.parent.is_none());
         let mut sortings = match (&basis, &model.setup.contact) {
-            (Some(basis), Some(settings))
-                if patches::are_sorted_by_workers(
-                    model,
-                    &self.options,
-                    &speeds,
-                    basis.sorter.surface().nodes.len() as f64,
-                ) =>
-            {
+            (Some(basis), Some(settings)) if by_workers => {
                 let owners = decompose::owners(&model.mesh, &layout);
                 let (surface, exclusions) = (basis.sorter.surface(), basis.sorter.exclusions());
                 let who = (&owners[..], &division.gather[..], &*basis.node_owners);
@@ -224,7 +222,6 @@ impl Job {
             }
             _ => Vec::new(),
         };
-        let by_workers = !sortings.is_empty();
         for (position, share) in division.by_worker.into_iter().enumerate() {
             let Share { subdomains, n_pieces, blocks } = share;
             let cuttings = Cutting::of(state, number, blocks);
