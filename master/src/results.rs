@@ -3,7 +3,7 @@
 //! A results folder holds `state-NNNNNN.vtu` (one file per written state, [`vtu`]), `results.pvd` (the index
 //! that ParaView opens, with the time of each state), where the deck asks for it `contact-NNNNNN.vtp` and `contact.pvd`
 //! (the same of the contact surface, [`surface`]), `history.csv` ([`history`]), `summary.json`
-//! ([`summary`]), `report.html` ([`report`]), the same states in other formats where they are wanted ([`format`]), the deck that it was
+//! ([`summary`]), `report.html` ([`report`]), the same states in other formats where they are wanted ([`mod@format`]), the deck that it was
 //! computed from with all that it refers to (`input.deck`), and, where the run
 //! came to an end, checksums of all that ([`sums`]). Every file appears whole or not at all: it is written under a temporary name and renamed.
 //! Only the history grows in place, by whole rows. So the folder of a killed run opens.

@@ -13,8 +13,7 @@ pub const MASTER: &str = "127.0.0.1:7117";
 /// How a client reaches a master, and how it prints.
 #[derive(Args, Clone, Debug)]
 pub struct ClientArgs {
-    /// The master: HOST, HOST:PORT or [ADDRESS]:PORT
-    #[arg(long, default_value = MASTER)]
+    #[arg(long, default_value = MASTER, help = "The master: HOST, HOST:PORT or [ADDRESS]:PORT")]
     pub master: String,
     /// Folder with this host's certificates, as `bolide certs host` makes it
     #[arg(long, value_name = "FOLDER")]

@@ -24,8 +24,7 @@ pub struct PictureArgs {
     /// Pictures per second of the animation
     #[arg(long, value_name = "NUMBER", default_value_t = 10, requires = "movie", value_parser = clap::value_parser!(u16).range(1..=50))]
     pub rate: u16,
-    /// Add the mirror images at the planes of [symmetry] of the deck
-    #[arg(long)]
+    #[arg(long, help = "Add the mirror images at the planes of [symmetry] of the deck")]
     pub mirror: bool,
     /// Number of the state, from 0 [default: the last]
     #[arg(long, value_name = "N", conflicts_with = "time")]

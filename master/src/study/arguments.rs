@@ -20,8 +20,7 @@ pub enum On {
 pub struct StudyArgs {
     /// The study (TOML); master/STUDY.md has every key
     pub study: PathBuf,
-    /// Folder for the table and the page [default: results/study/<study name>]
-    #[arg(long)]
+    #[arg(long, help = "Folder for the table and the page [default: results/study/<study name>]")]
     pub out: Option<PathBuf>,
     /// Print the points that are known before the first run, with their identities, and run nothing
     #[arg(long)]
@@ -44,8 +43,7 @@ pub struct StudyArgs {
     /// Whom to tell when it is over
     #[command(flatten)]
     pub notify: NotifyArgs,
-    /// Put the runs into the queue of this master instead: HOST, HOST:PORT or [ADDRESS]:PORT
-    #[arg(long, conflicts_with_all = ["runs", "threads"])]
+    #[arg(long, conflicts_with_all = ["runs", "threads"], help = "Put the runs into the queue of this master instead: HOST, HOST:PORT or [ADDRESS]:PORT")]
     pub master: Option<String>,
     /// Folder with this host's certificates, as `bolide certs host` makes it
     #[arg(long, value_name = "FOLDER", requires = "master")]

@@ -1,7 +1,7 @@
 //! Computes a block of a run again, from what a checkpoint has of it, so that nobody needs to believe the machines that computed it.
 //!
 //! A *block file* is a [`Sample`] in bytes: 16 letters that say what it is, the release that computes it, the sample. The master gives the
-//! one of its newest checkpoint (`GET /api/jobs/N/sample`). For WebAssembly this crate is the whole module, see [`module`]: the physics of
+//! one of its newest checkpoint (`GET /api/jobs/N/sample`). For WebAssembly this crate is the whole module, see `module.rs`: the physics of
 //! every other platform, on one lane and one thread.
 //!
 //! As in `protocol::codec`, which does not compile for browsers, numbers are little-endian and of fixed size, and nothing is read

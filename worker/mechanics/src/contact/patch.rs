@@ -2,7 +2,7 @@
 //! their patches is near ([`Patch::near`]), and each sorts its own nodes against its own faces and those ([`sort`]).
 //!
 //! Every node is sorted by one worker, which sees all faces in reach of it. So the workers together list the pairs that
-//! [`super::sort`] of the whole surface lists, whatever the patches are. Only pairs of nodes and faces are found like this.
+//! [`super::sort()`] of the whole surface lists, whatever the patches are. Only pairs of nodes and faces are found like this.
 
 use serde::{Deserialize, Serialize};
 
