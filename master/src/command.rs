@@ -243,7 +243,7 @@ pub struct RunArgs {
     /// Relative speeds of the workers, separated by commas; missing ones are 1
     #[arg(long, value_delimiter = ',')]
     pub speeds: Vec<f64>,
-    /// Compute threads per worker [default: the cores that it may use]
+    /// Compute threads per worker [default: the cores that it may use, with --processes an equal share of them]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
     /// A process for each worker, over loopback TCP

@@ -75,15 +75,18 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     }
     let asked = &args.job;
     let cores = worker::processors::cores();
-    let threads = args.threads.map_or(cores, |t| t as usize);
+    let n = args.workers.map_or(args.speeds.len().max(1), |n| n as usize);
+    // Workers of one process share a pool; processes share the cores.
+    let share = if args.processes { (cores / n).max(1) } else { cores };
+    let threads = args.threads.map_or(share, |t| t as usize);
     // The start takes no more threads than the run; a pool that a process has already stays.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let of_start = if args.processes { cores.min(n * threads) } else { threads };
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(of_start).build_global();
     let text = gather_deck(&args.deck, reading)?;
     let mut model = read_gathered(&text, &args.deck.display().to_string())?;
     bring_end_forward(&mut model, asked)?;
     let others: Vec<_> = args.format.iter().filter(|name| !model.output.formats.contains(name)).collect();
     model.output.formats.extend(others.into_iter().cloned().collect::<Vec<_>>());
-    let n = args.workers.map_or(args.speeds.len().max(1), |n| n as usize);
     let specs: Vec<WorkerSpec> = speeds_for(n, &args.speeds)?
         .into_iter()
         .enumerate()

@@ -85,6 +85,9 @@ fn a_process_for_each_worker_gives_the_digest_of_one_process() {
     let summary = run(&[&three[..], &["--processes"]].concat());
     assert_eq!(digest_of(&summary), reference());
     assert_eq!((&summary["workers"], &summary["cycles"]), (&3.into(), &40.into()));
+    // They share the cores.
+    let threads = 3 * (worker::processors::cores() / 3).max(1);
+    assert_eq!(summary["threads"], threads);
     // Every byte that the pipe in memory counts passes a link, and heartbeats and the like are few. A plan that would act after
     // the last cycle is sent or is not, as its sort is done in time or not: 3 % of such a short run.
     let embedded = run(&three);
