@@ -113,9 +113,7 @@ impl Seams {
                 add(one, other, [1.0, 0.0]);
                 continue;
             }
-            // A unit of which two workers own as many nodes is the lower one's.
-            let whose = if self.by_node { one } else { one.min(other) };
-            contact[whose as usize] += CONTACT_PAIRS;
+            contact[self.whose(one, other) as usize] += CONTACT_PAIRS;
             add(one, other, [0.0, 0.5]);
             // Those near it exchange a frame, however few nodes.
             for near in (0..8).filter_map(|corner| owner(self.shifted(places[1], corner))) {
@@ -142,12 +140,16 @@ impl Seams {
         (part, std::array::from_fn(shift))
     }
 
+    /// Whose contact it is if a node of one faces another: a unit of which two own as many nodes is the lower one's.
+    fn whose(&self, one: u32, other: u32) -> u32 {
+        if self.by_node { one } else { one.min(other) }
+    }
+
     /// How many pairs of nodes and faces each of so many parts has.
     pub fn pairs_of_parts(&self, n: usize) -> Vec<f64> {
         let mut pairs = vec![0.0; n];
         for Pair { places: [one, other], .. } in self.pairs.iter().filter(|pair| !pair.is_joined) {
-            let whose = if self.by_node { one.0 } else { one.0.min(other.0) };
-            pairs[whose as usize] += CONTACT_PAIRS;
+            pairs[self.whose(one.0, other.0) as usize] += CONTACT_PAIRS;
         }
         pairs
     }
