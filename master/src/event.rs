@@ -205,4 +205,6 @@ pub struct Outcome {
     pub differences: Vec<Difference>,
     /// Fragments that gained energy though nothing pushed them.
     pub runaways: Vec<Runaway>,
+    /// Cycles that waited for states on their way, of this session of the run.
+    pub waits: u64,
 }

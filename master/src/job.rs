@@ -228,6 +228,7 @@ impl Job {
             losses: std::mem::take(&mut tally.losses),
             differences: std::mem::take(&mut tally.differences),
             runaways: tally.fragments.take_runaways(),
+            waits: tally.waits,
         })));
     }
 
@@ -321,7 +322,10 @@ impl Job {
                 let before = Arc::clone(&self.checkpoints.newest().state);
                 let held = (!self.options.played).then(|| self.epoch.shares.held[worker]);
                 match self.epoch.worker_states.end((worker, n, held), cycle, last, &before)? {
-                    Some(worker_state) => self.collected(worker_state, actions),
+                    Some(worker_state) => {
+                        self.epoch.release(actions);
+                        self.collected(worker_state, actions)
+                    }
                     None => Ok(()),
                 }
             }
@@ -531,19 +535,23 @@ impl Job {
         self.account.move_walls(&self.problem, &vote, now.dt)?;
         let times = [next.time, next.time_after];
         let orders = self.orders_for(cycle + 1, next.dt, times, Some(&vote), actions);
+        let mut totals = Vec::new();
         match self.epoch.root {
             Some(root) => {
                 let message = ToWorker::Totals { cycle, orders, totals: Vec::new() };
-                actions.push(Action::Send(self.epoch.at_work[root], message));
+                totals.push(Action::Send(self.epoch.at_work[root], message));
             }
             None => {
                 let exchange = self.epoch.sorts.exchange_at(cycle)?;
-                self.epoch.send_all(actions, |worker| {
+                self.epoch.send_all(&mut totals, |worker| {
                     let totals = exchange.of_worker(worker, &frames.totals);
                     ToWorker::Totals { cycle, orders: orders.clone(), totals }
                 });
             }
         }
+        self.epoch.held.push_back((cycle, totals));
+        self.epoch.release(actions);
+        self.tally.waits += u64::from(!self.epoch.held.is_empty());
         self.retire(cycle);
         self.begin_sort(cycle, &frames.gathered, actions)?;
         let limit = next.limit;

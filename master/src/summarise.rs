@@ -135,6 +135,7 @@ pub fn summarise(
             .chain(outcome.runaways.iter().map(ToString::to_string))
             .chain(dead.iter().map(|gauge| dead_gauge_warning(gauge, Units::named(&model.units).time)))
             .chain(outcome.differences.iter().map(ToString::to_string))
+            .chain(waits_warning(outcome.waits, outcome.cycles_run))
             .collect(),
         quality: quality::judge(model, &parts, outcome, &dead),
         mirrors: model.output.mirrors,
@@ -203,6 +204,15 @@ fn dead_gauge_warning(gauge: &DeadGauge, unit: &str) -> String {
 const HOURGLASS_SHARE: f64 = 0.1;
 /// Share of the energy of the whole run below which the hourglass energy of a part is nothing to tell.
 const NEGLIGIBLE: f64 = 0.01;
+
+/// That more than a tenth of the cycles of a run waited for states on their way to the master.
+fn waits_warning(waits: u64, cycles: u64) -> Option<String> {
+    (waits > cycles / 10).then(|| {
+        format!(
+            "{waits} of {cycles} cycles waited for results on their way to the master: a longer period of [output] would shorten the run"
+        )
+    })
+}
 
 /// The parts whose hourglass energy is large beside their internal energy, as warnings. With the internal energy of a part that erodes
 /// goes what has `eroded` in the whole run, since some of it was its own; `scale` is the energy of the run.
@@ -282,6 +292,13 @@ mod tests {
         element::hourglass::Hourglass,
         mesh::{Part, Topology},
     };
+
+    #[test]
+    fn cycles_that_waited_for_results_are_told_where_they_are_many() {
+        assert_eq!(waits_warning(10, 100), None);
+        let told = waits_warning(11, 100).expect("more than a tenth");
+        assert!(told.starts_with("11 of 100 cycles waited for results"), "{told}");
+    }
 
     fn part(name: &str, internal: f64, hourglass: f64, eroded_elements: u64) -> NamedPart {
         NamedPart { name: name.to_owned(), internal, hourglass, eroded_elements, ..NamedPart::default() }

@@ -22,6 +22,12 @@ use crate::{
     options::CheckpointEvery, results::history::HistoryRow, run_totals::RunTotals, snapshot::Snapshot,
 };
 
+/// A checkpoint that the timer asks for waits for so many times the cycles that the last one was on its way: on slow wires, or of large
+/// problems, they take at most a twentieth of the time.
+const PAUSE: u64 = 20;
+/// Those that cycles ask for are asked for whatever they take, but not while so many are on their way, each of which takes memory.
+const AT_ONCE: usize = 4;
+
 /// Where an epoch can begin.
 #[derive(Clone)]
 pub(super) struct Checkpoint {
@@ -226,6 +232,8 @@ pub(super) struct Checkpoints {
     is_time: bool,
     /// The cycle of the last one that was asked for because it was due, or of the epoch's beginning.
     last: u64,
+    /// No timer asks for one before this cycle.
+    rested: u64,
     /// By cycle.
     on_their_way: BTreeMap<u64, Parts>,
 }
@@ -234,7 +242,7 @@ impl Checkpoints {
     /// Of a session that begins at `first`.
     pub(super) fn new(first: Checkpoint, keep: CheckpointEvery) -> Self {
         let last = first.cycle();
-        Self { newest: Arc::new(first), keep, is_time: false, last, on_their_way: BTreeMap::new() }
+        Self { newest: Arc::new(first), keep, is_time: false, last, rested: 0, on_their_way: BTreeMap::new() }
     }
 
     /// The newest one that is whole, and proved where samples are computed again.
@@ -251,6 +259,7 @@ impl Checkpoints {
     pub(super) fn begin_epoch(&mut self) {
         self.on_their_way.clear();
         self.last = self.newest.cycle();
+        self.rested = 0;
     }
 
     /// Keeps of the newest one only what never changes, and of that, without `sorts`, only lengths; gives it. For workers of which none
@@ -270,8 +279,11 @@ impl Checkpoints {
 
     /// Whether the state at the start of a cycle is to be kept, and for how long (s) the timer is to be set then.
     pub(super) fn due(&mut self, cycle: u64, at_boundary: bool) -> (bool, Option<f64>) {
-        let in_cycles = self.keep.cycles().is_some_and(|n| cycle >= self.last.saturating_add(n));
-        if !((self.is_time || in_cycles) && at_boundary) {
+        let n = self.on_their_way.len();
+        let in_cycles =
+            self.keep.cycles().is_some_and(|n| cycle >= self.last.saturating_add(n)) && n < AT_ONCE;
+        let in_time = self.is_time && n == 0 && cycle >= self.rested;
+        if !((in_time || in_cycles) && at_boundary) {
             return (false, None);
         }
         self.last = cycle;
@@ -308,11 +320,12 @@ impl Checkpoints {
         matches!(self.on_their_way.get(&cycle), Some(Parts { state: Some(_), continuation: Some(_) }))
     }
 
-    /// One that is whole.
-    pub(super) fn take(&mut self, cycle: u64) -> Option<Checkpoint> {
+    /// One that is whole, while the cycles have got to `now`.
+    pub(super) fn take(&mut self, cycle: u64, now: u64) -> Option<Checkpoint> {
         if !self.is_whole(cycle) {
             return None;
         }
+        self.rested = now.saturating_add(PAUSE.saturating_mul(now.saturating_sub(cycle)));
         let Parts { state, continuation } = self.on_their_way.remove(&cycle)?;
         Some(Checkpoint { state: Arc::new(state?), continuation: continuation? })
     }
@@ -341,13 +354,15 @@ mod tests {
             } else {
                 checkpoints.take_rest(7, continuation.clone());
             }
-            assert!(checkpoints.is_expected(7) && !checkpoints.is_whole(7) && checkpoints.take(7).is_none());
+            assert!(
+                checkpoints.is_expected(7) && !checkpoints.is_whole(7) && checkpoints.take(7, 7).is_none()
+            );
             if state_first {
                 checkpoints.take_rest(7, continuation);
             } else {
                 checkpoints.take_state(7, state);
             }
-            assert_eq!(checkpoints.take(7).map(|whole| whole.cycle()), Some(7));
+            assert_eq!(checkpoints.take(7, 8).map(|whole| whole.cycle()), Some(7));
             assert!(!checkpoints.is_expected(7), "it has been taken");
         }
     }
@@ -361,6 +376,35 @@ mod tests {
         assert_eq!(checkpoints.due(25, true), (true, Some(10.0)));
         assert_eq!(checkpoints.due(74, true), (false, None), "49 cycles after the last");
         assert_eq!(checkpoints.due(75, true), (true, None), "50 cycles; the timer still runs");
+    }
+
+    #[test]
+    fn one_that_took_long_is_followed_by_a_long_pause_and_cycles_ask_for_few_at_once() {
+        let first = checkpoint();
+        let give = |checkpoints: &mut Checkpoints, cycle, now| {
+            checkpoints.take_state(cycle, GlobalState { cycle, ..GlobalState::clone(&first.state) });
+            checkpoints.take_rest(cycle, first.continuation.clone());
+            assert!(checkpoints.take(cycle, now).is_some());
+        };
+        let mut checkpoints = Checkpoints::new(first.clone(), CheckpointEvery::Seconds(10.0));
+        checkpoints.time_has_come();
+        assert!(checkpoints.due(25, true).0);
+        checkpoints.expect(25);
+        checkpoints.time_has_come();
+        assert!(!checkpoints.due(50, true).0, "the last is on its way");
+        give(&mut checkpoints, 25, 60);
+        let later = 60 + 20 * 35;
+        assert!(!checkpoints.due(later - 10, true).0, "it was on its way for 35 cycles");
+        assert_eq!(checkpoints.due(later, true), (true, Some(10.0)));
+
+        let mut checkpoints = Checkpoints::new(first.clone(), CheckpointEvery::Cycles(1));
+        for cycle in 1..=4 {
+            assert!(checkpoints.due(cycle, true).0);
+            checkpoints.expect(cycle);
+        }
+        assert!(!checkpoints.due(5, true).0, "four are on their way");
+        give(&mut checkpoints, 1, 5);
+        assert!(checkpoints.due(6, true).0);
     }
 
     #[test]

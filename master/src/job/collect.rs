@@ -86,7 +86,8 @@ impl Job {
         if self.options.replay && !self.epoch.samples.are_all_here(cycle) {
             return Ok(());
         }
-        let Some(checkpoint) = self.checkpoints.take(cycle) else { return Ok(()) };
+        let now = self.epoch.schedule.completed();
+        let Some(checkpoint) = self.checkpoints.take(cycle, now) else { return Ok(()) };
         let checkpoint = Arc::new(checkpoint);
         if self.options.replay && !self.prove(&checkpoint, actions)? {
             return Ok(());

@@ -9,7 +9,7 @@
 //!   of a cycle with their states and the last vote; that is the checkpoint of the next epoch, and nothing is lost.
 //! - *A part becomes rigid or deforms again.* Likewise, at the first cycle that starts in its time or after it.
 
-use std::sync::Arc;
+use std::{collections::VecDeque, sync::Arc};
 
 use deck::model::Model;
 use protocol::message::{ToMaster, ToWorker};
@@ -42,6 +42,8 @@ pub(super) struct Epoch {
     /// States and samples, by the position of who sent them, that have overtaken votes on their way through the tree.
     pub(super) early: Vec<(usize, ToMaster)>,
     pub(super) worker_states: WorkerStates,
+    /// Totals and orders by cycle, in order, that wait until fewer states are on their way.
+    pub(super) held: VecDeque<(u64, Vec<Action>)>,
     pub(super) samples: Samples,
     pub(super) meter: Meter,
 }
@@ -60,6 +62,7 @@ impl Epoch {
             inflow: Inflow::new(0, checkpoint.continuation.vote.clone()),
             early: Vec::new(),
             worker_states: WorkerStates::default(),
+            held: VecDeque::new(),
             samples: Samples::default(),
             meter: Meter::new(0),
         }
@@ -73,6 +76,15 @@ impl Epoch {
     /// The position of a worker.
     pub(super) fn position(&self, index: usize) -> Option<usize> {
         self.at_work.iter().position(|&member| member == index)
+    }
+
+    /// Lets totals and orders go, but those of cycles for which too many states are on their way.
+    pub(super) fn release(&mut self, actions: &mut Vec<Action>) {
+        while let Some((_, totals)) =
+            self.held.pop_front_if(|(cycle, _)| !self.worker_states.are_behind(*cycle))
+        {
+            actions.extend(totals);
+        }
     }
 
     pub(super) fn send_all(&self, actions: &mut Vec<Action>, message: impl Fn(usize) -> ToWorker) {

@@ -27,6 +27,8 @@ pub(super) struct Tally {
     pub(super) losses: Vec<Loss>,
     pub(super) differences: Vec<Difference>,
     pub(super) fragments: Watch,
+    /// Cycles that waited for states on their way.
+    pub(super) waits: u64,
 }
 
 impl Tally {

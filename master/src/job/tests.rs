@@ -38,7 +38,11 @@ fn specs(n: usize) -> Vec<WorkerSpec> {
 }
 
 pub(super) fn job(n: usize) -> (Job, Vec<Action>) {
-    let model = deck::read(DECK, "two cubes").expect("a good deck");
+    job_of(DECK, n)
+}
+
+fn job_of(deck: &str, n: usize) -> (Job, Vec<Action>) {
+    let model = deck::read(deck, "two cubes").expect("a good deck");
     Job::new(Arc::new(model), &specs(n), SessionOptions::default(), None).expect("a good problem")
 }
 
@@ -53,7 +57,11 @@ fn pieces(job: &Job, worker: usize, cycle: u64) -> ToMaster {
 
 /// A job whose workers are ready and have their first orders, and the number of exchange nodes of each.
 fn started(n: usize) -> (Job, Vec<usize>) {
-    let (mut job, actions) = job(n);
+    started_of(DECK, n)
+}
+
+fn started_of(deck: &str, n: usize) -> (Job, Vec<usize>) {
+    let (mut job, actions) = job_of(deck, n);
     let exchange: Vec<usize> = actions
         .iter()
         .filter_map(|action| match action {
@@ -111,6 +119,33 @@ fn totals_are_the_sums_of_both_workers_and_come_when_both_have_sent() {
         .collect();
     assert_eq!(totals.len(), 2);
     assert!(totals.iter().all(|t| t.len() == 3 * exchange[0] && t.iter().all(|x| *x == 2.0)));
+}
+
+#[test]
+fn cycles_go_no_further_than_their_states_and_their_totals_come_in_order() {
+    let often = DECK.replace("end_cycle = 3", "end_cycle = 30") + "[output]\nperiod = 1e-9\n";
+    let (mut job, exchange) = started_of(&often, 1);
+    let totals_of = |actions: &[Action]| -> Vec<u64> {
+        let cycle = |action: &Action| match action {
+            Action::Send(0, ToWorker::Totals { cycle, .. }) => Some(*cycle),
+            _ => None,
+        };
+        actions.iter().filter_map(cycle).collect()
+    };
+    let hear = |job: &mut Job, message| totals_of(&job.apply(Event::Message(0, 0, message)));
+    for at in 0..2 {
+        assert_eq!(hear(&mut job, cycle(at, exchange[0])), [at]);
+    }
+    // Forces between workers may run ahead of the totals.
+    for at in [2, 3] {
+        assert_eq!(hear(&mut job, cycle(at, exchange[0])), [0; 0], "states 1 and 2 are on their way");
+    }
+    for at in [1, 2] {
+        let state = pieces(&job, 0, at);
+        assert_eq!(hear(&mut job, state), [0; 0], "not all of it");
+        let end = ToMaster::WorkerState { cycle: at, last: None, work: Work::default() };
+        assert_eq!(hear(&mut job, end), [at + 1]);
+    }
 }
 
 #[test]

@@ -13,6 +13,9 @@ use super::{
     frames::merge,
 };
 
+/// States on their way at which the cycles wait: one that travels, and one that follows without a gap.
+const ON_THEIR_WAY: usize = 2;
+
 /// A state on its way.
 struct Collecting {
     /// With the pieces that have come.
@@ -45,6 +48,12 @@ impl WorkerStates {
     /// States are sent at the start of a cycle, which begins at this time; `due` says that they are for the user.
     pub(super) fn order(&mut self, cycle: u64, time: f64, due: bool) {
         self.ordered.insert(cycle, (time, due));
+    }
+
+    /// Whether so many states of `cycle` and before are on their way that the cycles wait for one of them: where wires are slower than
+    /// states are asked for, those would else pile up in the memory of workers.
+    pub(super) fn are_behind(&self, cycle: u64) -> bool {
+        self.ordered.range(..=cycle).count() >= ON_THEIR_WAY
     }
 
     /// Adds pieces of one of `n` workers. What no cycle changes is taken from `before`, the state that work was dealt out from.
@@ -145,6 +154,19 @@ mod tests {
         let unasked = Some(Error::Worker(1, Breach::Unasked(Sent::WorkerState, 9)));
         assert_eq!(end(&mut worker_states, 1, 9).err(), unasked);
         assert_eq!(worker_states.add((1, 2), 9, Vec::new(), job.start_state()).err(), unasked);
+    }
+
+    #[test]
+    fn cycles_wait_once_two_states_are_on_their_way_that_need_no_more_orders() {
+        let (job, _) = job(1);
+        let mut worker_states = WorkerStates::default();
+        for cycle in [8, 9, 11] {
+            worker_states.order(cycle, 0.25, true);
+        }
+        assert!(!worker_states.are_behind(8), "the one of cycle 9 cannot come before cycle 8 is complete");
+        assert!(worker_states.are_behind(9) && worker_states.are_behind(10));
+        worker_states.end((0, 1, Some(0)), 8, None, job.start_state()).expect("ordered").expect("whole");
+        assert!(!worker_states.are_behind(10) && worker_states.are_behind(11));
     }
 
     #[test]
