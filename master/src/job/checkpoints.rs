@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// A checkpoint that the timer asks for waits for so many times the cycles that the last one was on its way: on slow wires, or of large
-/// problems, they take at most a twentieth of the time.
+/// problems, one is on its way in at most one cycle of 21.
 const PAUSE: u64 = 20;
 /// Those that cycles ask for are asked for whatever they take, but not while so many are on their way, each of which takes memory.
 const AT_ONCE: usize = 4;
