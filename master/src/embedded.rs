@@ -6,7 +6,6 @@
 
 use std::{
     collections::{BTreeMap, VecDeque},
-    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -23,6 +22,7 @@ use protocol::{
 use system::clock::thread_cpu_ns;
 use worker::{
     compute::{Machine, ThreadClock},
+    crew::Crew,
     session::{self, Task},
     stopwatch::{Lap, Stopwatch},
 };
@@ -110,9 +110,9 @@ struct LocalWorker {
 }
 
 impl LocalWorker {
-    fn new() -> Self {
+    fn new(machine: Machine) -> Self {
         Self {
-            machine: Some(Box::default()),
+            machine: Some(Box::new(machine)),
             stopwatch: Stopwatch::new(),
             lost: false,
             touch: None,
@@ -157,12 +157,17 @@ pub fn run_through(
         .map_err(|e| format!("compute threads: {e}"))?;
     let pool = Arc::new(pool);
     let (send, receive) = mpsc::channel();
+    let crew = Crew::default();
     let process = Process {
         sink,
-        places: (0..n_workers).map(|_| LocalWorker::new()).collect(),
+        places: match n_workers {
+            1 => vec![LocalWorker::new(Machine::alone(crew.clone()))],
+            n => (0..n).map(|_| LocalWorker::new(Machine::new())).collect(),
+        },
         queue: VecDeque::new(),
         // With one worker, tasks run where the loop runs: on the pool.
         pool: (n_workers > 1).then(|| Arc::clone(&pool)),
+        crew,
         threads,
         send,
         receive,
@@ -187,6 +192,8 @@ struct Process<'a> {
     places: Vec<LocalWorker>,
     queue: VecDeque<Arrival>,
     pool: Option<Arc<rayon::ThreadPool>>,
+    /// Of one worker: the threads of the pool that stay awake for it.
+    crew: Crew,
     threads: usize,
     send: mpsc::Sender<Arrival>,
     receive: mpsc::Receiver<Arrival>,
@@ -229,7 +236,7 @@ fn drive(
             Some(Fate::Stop) => stop.store(true, Ordering::Relaxed),
             Some(Fate::Touch(host, touch)) => world.surroundings.places[host].touch = Some(touch),
             Some(Fate::Join(spec)) => {
-                world.surroundings.places.push(LocalWorker::new());
+                world.surroundings.places.push(LocalWorker::new(Machine::new()));
                 let host = world.sessions.add_host();
                 world.join(host, spec)?;
             }
@@ -362,23 +369,7 @@ impl Surroundings for Process<'_> {
         };
         match &self.pool {
             Some(pool) => pool.spawn(work),
-            None => {
-                // On the pool a thread that waits for the end of a phase would begin it, and the others would wait for the sort.
-                let beside = self.places.first().and_then(|place| Some(place.machine.as_ref()?.beside()));
-                let beside = beside.unwrap_or_default();
-                beside.fetch_add(1, Ordering::Relaxed);
-                let work = move || {
-                    work();
-                    beside.fetch_sub(1, Ordering::Relaxed);
-                };
-                std::thread::Builder::new()
-                    .name("sort".to_owned())
-                    .spawn(|| {
-                        // As on the pool: nobody could go on without what it would have found.
-                        catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| std::process::abort());
-                    })
-                    .map_err(|e| Error::Surroundings(format!("a thread for the sort: {e}")))?;
-            }
+            None => self.crew.beside(work),
         }
         Ok(())
     }

@@ -1,15 +1,12 @@
 //! Does what a session asks: the domain, the lanes, the clock of compute threads.
 
 use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
-    },
+    sync::atomic::{AtomicU64, Ordering},
     time::Instant,
 };
 
 use mechanics::{
-    cycle::{Domain, Load, Meter, Sets},
+    cycle::{Domain, Load, Meter, Sets, Unmeasured},
     flip::Target,
     lanes::Width,
 };
@@ -20,6 +17,7 @@ use protocol::{
 use system::clock::thread_cpu_ns;
 
 use crate::{
+    crew::Crew,
     session::{Outcome, Task},
     sorter::Sorter,
     stopwatch::Lap,
@@ -28,13 +26,13 @@ use crate::{
 /// Elements of a worker from which on the memory of what was sent of them is looked after.
 const MANY: usize = 1 << 17;
 
-/// Counts thread-CPU time of compute threads (ns).
+/// Counts thread-CPU time of compute threads (ns), and keeps them awake where they have nothing else to do.
 #[derive(Debug, Default)]
 pub struct ThreadClock {
+    crew: Option<Crew>,
     all: AtomicU64,
     contact: AtomicU64,
     dealt: AtomicU64,
-    beside: Arc<AtomicUsize>,
 }
 
 impl Meter for ThreadClock {
@@ -50,8 +48,11 @@ impl Meter for ThreadClock {
         self.dealt.fetch_add(thread_cpu_ns().saturating_sub(mark), Ordering::Relaxed);
     }
 
-    fn beside(&self) -> usize {
-        self.beside.load(Ordering::Relaxed)
+    fn together(&self, n: usize, work: &(dyn Fn() + Sync)) {
+        match &self.crew {
+            Some(crew) => crew.together(n, work),
+            None => Unmeasured.together(n, work),
+        }
     }
 
     fn stop_dealt(&self, mark: u64, contact: bool) {
@@ -62,6 +63,11 @@ impl Meter for ThreadClock {
 }
 
 impl ThreadClock {
+    /// The same threads, nothing counted.
+    fn afresh(&self) -> Self {
+        Self { crew: self.crew.clone(), ..Self::default() }
+    }
+
     fn book(&self, used: u64, contact: bool) {
         self.all.fetch_add(used, Ordering::Relaxed);
         if contact {
@@ -115,14 +121,19 @@ impl Laps {
 }
 
 impl Machine {
-    /// Without a job.
+    /// Without a job, on a pool that computes for others as well.
     pub fn new() -> Self {
         Self::default()
     }
 
+    /// Without a job, on a pool that computes for nobody else: between two dealings of a cycle this crew keeps its threads awake.
+    pub fn alone(crew: Crew) -> Self {
+        Self { clock: ThreadClock { crew: Some(crew), ..ThreadClock::default() }, ..Self::default() }
+    }
+
     /// Drops the domain.
     pub fn forget(&mut self) {
-        *self = Self::default();
+        *self = Self { clock: self.clock.afresh(), ..Self::default() };
     }
 
     /// What the domain holds; nothing without one.
@@ -133,11 +144,6 @@ impl Machine {
     /// Thread-CPU time of its tasks so far, over all epochs of a job.
     pub fn work(&self) -> Work {
         self.clock.work()
-    }
-
-    /// Counts threads of the pool that have something else to do: whoever has one begin adds it, and takes it off when it ends.
-    pub fn beside(&self) -> Arc<AtomicUsize> {
-        Arc::clone(&self.clock.beside)
     }
 
     /// See [`ThreadClock::dealt_ns`].
@@ -283,7 +289,7 @@ impl Machine {
             self.sorter = Some(Sorter::new(*sorting, settings.as_ref(), &domain)?);
         }
         if !further_epoch {
-            self.clock = ThreadClock::default();
+            self.clock = self.clock.afresh();
         }
         self.domain = Some(domain);
         Ok(Outcome::Loaded { vote, lanes: width.to_string() })

@@ -1,14 +1,15 @@
 //! The worker: holds sub-domains and work units, computes, exchanges.
 //!
-//! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics; [`daemon`]
-//! carries bytes between a master and the compute thread of [`runner`]; [`peers`] between that and other workers.
-//! [`stopwatch`] tells where the time goes, [`notify`] a service manager how this process does;
-//! [`owner`] steps back where the people whose PC it is on need it;
+//! [`session`] is a pure state machine that decides; [`compute`] does what it asks on the mechanics, on threads
+//! that a [`crew`] keeps awake; [`daemon`] carries bytes between a master and the compute thread of [`runner`];
+//! [`peers`] between that and other workers. [`stopwatch`] tells where the time goes, [`notify`] a service manager
+//! how this process does; [`owner`] steps back where the people whose PC it is on need it;
 //! [`processors`] confines it to some of this machine's; in [`slots`] several small jobs share its threads.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 
 pub mod compute;
+pub mod crew;
 pub mod daemon;
 pub mod input;
 pub mod notify;

@@ -21,6 +21,7 @@ use tokio::sync::mpsc;
 
 use crate::{
     compute::Machine,
+    crew::{Crew, awake},
     input::{Input, Key},
     owner::Share,
     peers::links::{Links, Step},
@@ -65,7 +66,7 @@ impl Runner {
             compute,
             outbox,
             session: Session::new(),
-            machine: Machine::new(),
+            machine: Machine::alone(Crew::default()),
             watch: Watch::default(),
             stopwatch: Stopwatch::new(),
             links,
@@ -83,7 +84,7 @@ impl Runner {
     /// # Errors
     /// Why the connection to the master must end: [`Error::Left`] if it was asked to leave and holds nothing any more.
     pub fn run(&mut self, inputs: &mut mpsc::Receiver<Input>) -> Result<Option<u32>> {
-        while let Some(input) = inputs.blocking_recv() {
+        while let Some(input) = awake(|| inputs.try_recv().ok()).or_else(|| inputs.blocking_recv()) {
             match input {
                 Input::Master(header, message) => self.master(&header, message)?,
                 Input::Peer(news) => {
@@ -246,7 +247,7 @@ impl Runner {
                             self.stopwatch.book(self.session.cycle(), lap);
                         }
                         let outcome = outcome.unwrap_or_else(|panic| {
-                            self.machine = Machine::new();
+                            self.machine = Machine::alone(Crew::default());
                             Outcome::Failed(format!("a bug in the worker: {}", words(panic.as_ref())))
                         });
                         events.push_back(Event::Done(outcome));

@@ -20,6 +20,8 @@ pub mod standing;
 mod tests;
 mod touch;
 
+use std::sync::{Mutex, PoisonError};
+
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -301,20 +303,28 @@ impl Domain {
             held_block.lead(bodies, &advance);
             held_block.integrate(&advance, setup, width);
         };
-        let (held_blocks, order) = (&mut self.held_blocks, &mut self.order);
         let (ghosts, unbooked) = (&mut self.ghosts, &mut self.unbooked);
-        if ghosts.node.is_empty() {
-            order.deal(held_blocks, meter, of_block);
-        } else {
-            let of_ghosts = || {
-                let mark = meter.start();
-                ghosts.take_totals(totals, numbers);
-                ghosts.lead(bodies, &advance);
-                ghosts.integrate(&advance, unbooked, width);
-                meter.stop(mark, false);
-            };
-            rayon::join(|| order.deal(held_blocks, meter, of_block), of_ghosts);
-        }
+        let of_ghosts = || {
+            ghosts.take_totals(totals, numbers);
+            ghosts.lead(bodies, &advance);
+            ghosts.integrate(&advance, unbooked, width);
+        };
+        // Whoever takes the first block takes them along.
+        let of_ghosts = Mutex::new(Some(of_ghosts));
+        let take_ghosts = || {
+            let taken = of_ghosts.lock().unwrap_or_else(PoisonError::into_inner).take();
+            if let Some(mut of_ghosts) = taken {
+                of_ghosts();
+            }
+        };
+        self.order.deal(&mut self.held_blocks, meter, |held_block| {
+            take_ghosts();
+            of_block(held_block);
+        });
+        // Without a block they are all there is.
+        let mark = meter.start();
+        take_ghosts();
+        meter.stop(mark, false);
         if std::mem::take(&mut self.surface_ends) {
             self.vote.released = Some(self.spring_energies(dt, meter));
         }

@@ -17,12 +17,12 @@ where
     if n_items == 0 {
         return;
     }
-    let all_threads = rayon::current_num_threads().saturating_sub(meter.beside()).max(1);
+    let all_threads = rayon::current_num_threads();
     let dealt = meter.start();
     let n_threads = all_threads.min(n_items);
     if n_threads > 1 {
         let queue = Mutex::new(items);
-        together(n_threads, &|| {
+        meter.together(n_threads, &|| {
             let mark = meter.start();
             while let Some(item) = next(&queue) {
                 work(item);
@@ -44,15 +44,6 @@ where
 /// The next item. Work that panics does so without the lock.
 fn next<I: Iterator>(queue: &Mutex<I>) -> Option<I::Item> {
     queue.lock().unwrap_or_else(PoisonError::into_inner).next()
-}
-
-/// Has `n` threads do the same; a thread that comes late finds nothing to do. Halves wake up each other's threads.
-fn together(n: usize, work: &(impl Fn() + Sync)) {
-    if n > 1 {
-        rayon::join(|| together(n - n / 2, work), || together(n / 2, work));
-    } else {
-        work();
-    }
 }
 
 #[cfg(test)]
