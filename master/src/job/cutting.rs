@@ -8,6 +8,7 @@ use mechanics::{
     state::GlobalState,
 };
 use protocol::message::{ToWorker, at_once};
+use rayon::prelude::*;
 
 /// Some pieces that a worker is to hold, before they are cut.
 pub struct Cutting {
@@ -37,6 +38,6 @@ impl Cutting {
             let piece = piece::cut(mesh, &self.state, block.part, &block.region);
             (block.subdomain, piece)
         };
-        ToWorker::Pieces { epoch: self.epoch, pieces: self.blocks.iter().map(cut).collect() }
+        ToWorker::Pieces { epoch: self.epoch, pieces: self.blocks.par_iter().map(cut).collect() }
     }
 }

@@ -14,7 +14,7 @@ pub fn digest(state: &GlobalState) -> String {
     hasher.update(&state.cycle.to_le_bytes());
     hasher.update(&state.time.to_le_bytes());
     for vectors in [&state.x, &state.v] {
-        update(&mut hasher, vectors.iter().flatten());
+        update(&mut hasher, vectors.as_flattened());
     }
     for (name, field) in FIELDS.iter().zip(&state.elements) {
         if LAW_FIELDS.contains(name) {
@@ -38,23 +38,23 @@ pub fn digest(state: &GlobalState) -> String {
     }
     // A run without shells, elastic hourglass control and history variables has nothing here, and the digest that it had before there
     // were any.
-    update(&mut hasher, state.shells.spin.iter().flatten());
-    update(&mut hasher, state.own.iter().flatten());
-    update(&mut hasher, state.history.iter().flat_map(|part| &part.columns).flatten());
+    update(&mut hasher, state.shells.spin.as_flattened());
+    state.own.iter().for_each(|array| update(&mut hasher, array));
+    state.history.iter().flat_map(|part| &part.columns).for_each(|column| update(&mut hasher, column));
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
-/// Numbers that go into the hash at a time: threads share them, and single numbers take it long.
-const AT_A_TIME: usize = 1 << 17;
+/// Numbers of an array from which on threads share it.
+const MANY: usize = 1 << 14;
 
-fn update<'a>(hasher: &mut blake3::Hasher, values: impl IntoIterator<Item = &'a f64>) {
-    let mut bytes = Vec::new();
-    for value in values {
-        bytes.extend_from_slice(&value.to_le_bytes());
-        if bytes.len() == 8 * AT_A_TIME {
-            hasher.update_rayon(&bytes);
-            bytes.clear();
-        }
+fn update(hasher: &mut blake3::Hasher, values: &[f64]) {
+    if cfg!(target_endian = "big") {
+        values.iter().for_each(|value| {
+            hasher.update(&value.to_le_bytes());
+        });
+    } else if values.len() < MANY {
+        hasher.update(bytemuck::cast_slice(values));
+    } else {
+        hasher.update_rayon(bytemuck::cast_slice(values));
     }
-    hasher.update_rayon(&bytes);
 }

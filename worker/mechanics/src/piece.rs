@@ -220,8 +220,10 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
             inertia: nodes.iter().map(|&n| state.shells.inertia[n as usize]).collect(),
         },
     };
-    let own = state.own[..mesh_part.n_own()].iter();
-    let own = own.map(|field| sparse(elements.iter().map(|&e| field[e as usize]))).collect();
+    let of_elements = |field: &Vec<f64>| sparse(elements.iter().map(|&e| field[e as usize]));
+    let own = state.own[..mesh_part.n_own()].par_iter().map(of_elements).collect();
+    let mut fields: [Vec<f64>; N_FIELDS] = Default::default();
+    fields.par_iter_mut().zip(&state.elements).for_each(|(to, from)| *to = of_elements(from));
     Piece {
         part: part as u32,
         material: mesh_part.material,
@@ -231,9 +233,7 @@ pub fn cut(mesh: &Mesh, state: &GlobalState, part: usize, region: &Region) -> Pi
         mass: nodes.iter().map(|&n| state.mass[n as usize]).collect(),
         constraint: nodes.iter().map(|&n| state.constraint[n as usize]).collect(),
         initial_volume: elements.iter().map(|&e| state.initial_volume[e as usize]).collect(),
-        fields: std::array::from_fn(|k: usize| {
-            sparse(elements.iter().map(|&e| state.elements[k][e as usize]))
-        }),
+        fields,
         erosion: (!state.eroded.is_empty()).then(|| PieceErosion {
             eroded: elements.iter().map(|&e| state.eroded[e as usize]).collect(),
             strain: if state.strain.is_empty() {

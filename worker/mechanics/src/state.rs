@@ -60,8 +60,15 @@ pub mod field {
     pub const VISCOSITY: usize = 12;
 }
 
-/// An array of these values of which pages that hold nothing but zeros take no memory until they are written.
+/// From which size on an array spares pages of zeros: a page that is read before it is written is mapped twice, which takes longer than it
+/// is worth for little memory.
+const SPARSE: usize = 1 << 15;
+
+/// An array of these values of which, if there are many, pages that hold nothing but zeros take no memory until they are written.
 pub(crate) fn sparse(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64> {
+    if values.len() < SPARSE {
+        return values.collect();
+    }
     let mut array = vec![0.0; values.len()];
     for (place, value) in array.iter_mut().zip(values) {
         if value.to_bits() != 0 {
