@@ -14,7 +14,7 @@ use super::{
 };
 
 /// Nodes of units for which another share is worth its own lists.
-const NODES: usize = 256;
+const NODES: usize = 512;
 /// Pairs that are listed one by one likewise.
 const PAIRS: usize = 256;
 

@@ -17,8 +17,9 @@ use crate::{
     lanes::Width,
 };
 
-/// Shares for each thread: so many that one which is slow holds up the others by little.
-const SHARES: usize = 4;
+/// Shares for each thread: each more costs what it has of its neighbours (of 64,000 elements with 3,400 nodes in contact, 8 shares cost 30 % more
+/// than one, 2 cost 7 %).
+const SHARES: usize = 2;
 
 /// The contact nodes of one share, packed, and where their positions come from.
 pub(super) struct HeldContact {
