@@ -22,9 +22,9 @@ use protocol::{
 use system::clock::thread_cpu_ns;
 use worker::{
     compute::{Machine, ThreadClock},
-    crew::Crew,
     session::{self, Task},
     stopwatch::{Lap, Stopwatch},
+    team::Team,
 };
 
 use crate::{
@@ -157,17 +157,17 @@ pub fn run_through(
         .map_err(|e| format!("compute threads: {e}"))?;
     let pool = Arc::new(pool);
     let (send, receive) = mpsc::channel();
-    let crew = Crew::default();
+    let team = Team::default();
     let process = Process {
         sink,
         places: match n_workers {
-            1 => vec![LocalWorker::new(Machine::alone(crew.clone()))],
+            1 => vec![LocalWorker::new(Machine::alone(team.clone()))],
             n => (0..n).map(|_| LocalWorker::new(Machine::new())).collect(),
         },
         queue: VecDeque::new(),
         // With one worker, tasks run where the loop runs: on the pool.
         pool: (n_workers > 1).then(|| Arc::clone(&pool)),
-        crew,
+        team,
         threads,
         send,
         receive,
@@ -193,7 +193,7 @@ struct Process<'a> {
     queue: VecDeque<Arrival>,
     pool: Option<Arc<rayon::ThreadPool>>,
     /// Of one worker: the threads of the pool that stay awake for it.
-    crew: Crew,
+    team: Team,
     threads: usize,
     send: mpsc::Sender<Arrival>,
     receive: mpsc::Receiver<Arrival>,
@@ -369,7 +369,7 @@ impl Surroundings for Process<'_> {
         };
         match &self.pool {
             Some(pool) => pool.spawn(work),
-            None => self.crew.beside(work),
+            None => self.team.beside(work),
         }
         Ok(())
     }

@@ -17,10 +17,10 @@ use protocol::{
 use system::clock::thread_cpu_ns;
 
 use crate::{
-    crew::Crew,
     session::{Outcome, Task},
     sorter::Sorter,
     stopwatch::Lap,
+    team::Team,
 };
 
 /// Elements of a worker from which on the memory of what was sent of them is looked after.
@@ -29,7 +29,7 @@ const MANY: usize = 1 << 17;
 /// Counts thread-CPU time of compute threads (ns), and keeps them awake where they have nothing else to do.
 #[derive(Debug, Default)]
 pub struct ThreadClock {
-    crew: Option<Crew>,
+    team: Option<Team>,
     all: AtomicU64,
     contact: AtomicU64,
     dealt: AtomicU64,
@@ -49,8 +49,8 @@ impl Meter for ThreadClock {
     }
 
     fn together(&self, n: usize, work: &(dyn Fn() + Sync)) {
-        match &self.crew {
-            Some(crew) => crew.together(n, work),
+        match &self.team {
+            Some(team) => team.together(n, work),
             None => Unmeasured.together(n, work),
         }
     }
@@ -65,7 +65,7 @@ impl Meter for ThreadClock {
 impl ThreadClock {
     /// The same threads, nothing counted.
     fn afresh(&self) -> Self {
-        Self { crew: self.crew.clone(), ..Self::default() }
+        Self { team: self.team.clone(), ..Self::default() }
     }
 
     fn book(&self, used: u64, contact: bool) {
@@ -126,9 +126,9 @@ impl Machine {
         Self::default()
     }
 
-    /// Without a job, on a pool that computes for nobody else: between two dealings of a cycle this crew keeps its threads awake.
-    pub fn alone(crew: Crew) -> Self {
-        Self { clock: ThreadClock { crew: Some(crew), ..ThreadClock::default() }, ..Self::default() }
+    /// Without a job, on a pool that computes for nobody else: between two dealings of a cycle this team keeps its threads awake.
+    pub fn alone(team: Team) -> Self {
+        Self { clock: ThreadClock { team: Some(team), ..ThreadClock::default() }, ..Self::default() }
     }
 
     /// Drops the domain.

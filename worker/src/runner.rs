@@ -21,13 +21,13 @@ use tokio::sync::mpsc;
 
 use crate::{
     compute::Machine,
-    crew::{Crew, awake},
     input::{Input, Key},
     owner::Share,
     peers::links::{Links, Step},
     session::{Action, Event, Outcome, Session, Task},
     slots::Slot,
     stopwatch::{Lap, Stopwatch},
+    team::{Team, awake},
 };
 
 /// How often the master hears between cycles how the time goes.
@@ -66,7 +66,7 @@ impl Runner {
             compute,
             outbox,
             session: Session::new(),
-            machine: Machine::alone(Crew::default()),
+            machine: Machine::alone(Team::default()),
             watch: Watch::default(),
             stopwatch: Stopwatch::new(),
             links,
@@ -247,7 +247,7 @@ impl Runner {
                             self.stopwatch.book(self.session.cycle(), lap);
                         }
                         let outcome = outcome.unwrap_or_else(|panic| {
-                            self.machine = Machine::alone(Crew::default());
+                            self.machine = Machine::alone(Team::default());
                             Outcome::Failed(format!("a bug in the worker: {}", words(panic.as_ref())))
                         });
                         events.push_back(Event::Done(outcome));

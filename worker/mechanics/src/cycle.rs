@@ -321,10 +321,11 @@ impl Domain {
             take_ghosts();
             of_block(held_block);
         });
-        // Without a block they are all there is.
-        let mark = meter.start();
-        take_ghosts();
-        meter.stop(mark, false);
+        if self.held_blocks.is_empty() {
+            let mark = meter.start();
+            take_ghosts();
+            meter.stop(mark, false);
+        }
         if std::mem::take(&mut self.surface_ends) {
             self.vote.released = Some(self.spring_energies(dt, meter));
         }

@@ -44,7 +44,7 @@ pub fn digest(state: &GlobalState) -> String {
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
-/// Numbers of an array from which on threads share it.
+/// Numbers of an array from which on threads share it: the least for which BLAKE3 advises it.
 const MANY: usize = 1 << 14;
 
 fn update(hasher: &mut blake3::Hasher, values: &[f64]) {

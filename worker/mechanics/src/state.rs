@@ -239,7 +239,9 @@ mod tests {
     fn every_number_is_kept_to_the_bit_by_arrays_that_spare_zeros() {
         let numbers = [0.0, -0.0, 1.5, f64::MIN_POSITIVE / 2.0, 0.0, f64::NAN];
         let bits = |array: &[f64]| array.iter().map(|number| number.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(&sparse(numbers.into_iter())), bits(&numbers));
+        for numbers in [numbers.to_vec(), numbers.repeat(SPARSE)] {
+            assert_eq!(bits(&sparse(numbers.iter().copied())), bits(&numbers));
+        }
         for before in [0.0, -0.0, 7.0] {
             let mut array = [before; 6];
             array.iter_mut().zip(numbers).for_each(|(place, number)| write_sparsely(place, number));

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Shares for each thread: each more costs what it has of its neighbours (of 64,000 elements with 3,400 nodes in contact, 8 shares cost 30 % more
-/// than one, 2 cost 7 %).
+/// than one, 2 cost 6 %).
 const SHARES: usize = 2;
 
 /// The contact nodes of one share, packed, and where their positions come from.

@@ -1,7 +1,7 @@
 //! Threads that stay awake between the dealings of a cycle.
 //!
 //! A cycle deals work several times, and two dealings lie so close together that a thread which sleeps between them loses more by waking
-//! up than it would have waited. The members of a [`Crew`] are jobs of the current pool. A member looks for the next dealing all the time, and leaves, so that
+//! up than it would have waited. The members of a [`Team`] are jobs of the current pool. A member looks for the next dealing all the time, and leaves, so that
 //! its thread may sleep, when none has come for [`PATIENCE`] or another thread wants its core. It also does what runs beside the cycles, such as a
 //! sort; the dealings meanwhile go to the others, and to that member as soon as it is back.
 
@@ -23,15 +23,15 @@ const PATIENCE: Duration = Duration::from_micros(500);
 /// An offer of the core to other threads that takes longer than this was accepted by one.
 const CONTENDED: Duration = Duration::from_micros(50);
 
-/// How often a waiting thread looks before it offers its core to other threads.
-const LOOKS: usize = 50;
+/// Pauses of the processor between two looks, before the core is offered to other threads.
+const PAUSES: usize = 50;
 
 /// What runs beside the cycles.
 type Job = Box<dyn FnOnce() + Send>;
 
 /// Members that wait for what one thread deals, one dealing at a time, and for what is to run beside. Clones share them.
 #[derive(Clone, Default)]
-pub struct Crew(Arc<Shared>);
+pub struct Team(Arc<Shared>);
 
 #[derive(Default)]
 struct Shared {
@@ -56,7 +56,7 @@ struct Dealing {
     panic: Option<Box<dyn Any + Send>>,
 }
 
-impl Crew {
+impl Team {
     /// Has the calling thread and up to `n - 1` members do the same. A member that comes late does nothing.
     pub fn together(&self, n: usize, work: &(dyn Fn() + Sync)) {
         let shared = &*self.0;
@@ -101,6 +101,7 @@ impl Shared {
             let news = self.news.load(Ordering::SeqCst);
             if news != seen {
                 seen = news;
+                // One that finds no place gets tired: the pool has become smaller.
                 if self.do_jobs() | self.take_part() {
                     since = Instant::now();
                 }
@@ -166,15 +167,15 @@ pub fn awake<T>(mut look: impl FnMut() -> Option<T>) -> Option<T> {
 
 /// Waits for very little, and lets other threads have the core; says whether one wanted it.
 fn look_away() -> bool {
-    (0..LOOKS).for_each(|_| std::hint::spin_loop());
+    (0..PAUSES).for_each(|_| std::hint::spin_loop());
     let from = Instant::now();
     std::thread::yield_now();
     from.elapsed() > CONTENDED
 }
 
-impl std::fmt::Debug for Crew {
+impl std::fmt::Debug for Team {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Crew").field("members", &self.0.members).finish_non_exhaustive()
+        f.debug_struct("Team").field("members", &self.0.members).finish_non_exhaustive()
     }
 }
 
@@ -196,15 +197,15 @@ mod tests {
 
     #[test]
     fn members_take_part_in_each_dealing_and_never_after_its_end() {
-        let crews = [Crew::default(), Crew::default()];
+        let teams = [Team::default(), Team::default()];
         pool(4).scope(|scope| {
             // Two threads deal at once.
-            for crew in &crews {
+            for team in &teams {
                 scope.spawn(move |_| {
                     for dealing in 0..2000 {
                         let (begun, ended) = (AtomicUsize::new(0), AtomicUsize::new(0));
                         let n = 2 + dealing as usize % 3;
-                        crew.together(n, &|| {
+                        team.together(n, &|| {
                             begun.fetch_add(1, Ordering::Relaxed);
                             pause(dealing);
                             ended.fetch_add(1, Ordering::Relaxed);
@@ -220,18 +221,18 @@ mod tests {
 
     #[test]
     fn members_come_and_all_leave_when_nothing_is_dealt() {
-        let crew = Crew::default();
+        let team = Team::default();
         pool(3).install(|| {
             let begun = AtomicUsize::new(0);
             // The calling thread waits for the others within the dealing.
-            crew.together(3, &|| {
+            team.together(3, &|| {
                 begun.fetch_add(1, Ordering::SeqCst);
                 while begun.load(Ordering::SeqCst) < 3 {
                     std::thread::yield_now();
                 }
             });
             assert_eq!(begun.into_inner(), 3);
-            while crew.0.members.load(Ordering::SeqCst) > 0 {
+            while team.0.members.load(Ordering::SeqCst) > 0 {
                 std::thread::yield_now();
             }
         });
@@ -239,17 +240,17 @@ mod tests {
 
     #[test]
     fn a_member_does_what_is_to_run_beside_and_helps_again() {
-        let crew = Crew::default();
+        let team = Team::default();
         pool(2).install(|| {
             let (sender, receiver) = std::sync::mpsc::channel();
             let dealer = rayon::current_thread_index();
             for awake in [false, true] {
                 let sender = sender.clone();
-                crew.beside(move || sender.send(rayon::current_thread_index()).expect("the test waits"));
+                team.beside(move || sender.send(rayon::current_thread_index()).expect("the test waits"));
                 let by = receiver.recv().expect("a member does it");
                 assert!(by.is_some() && by != dealer, "{by:?}, awake before: {awake}");
                 let begun = AtomicUsize::new(0);
-                crew.together(2, &|| {
+                team.together(2, &|| {
                     begun.fetch_add(1, Ordering::SeqCst);
                     while begun.load(Ordering::SeqCst) < 2 {
                         std::thread::yield_now();
@@ -263,9 +264,9 @@ mod tests {
     fn a_panic_of_any_thread_reaches_the_caller_when_all_have_ended() {
         let pool = pool(2);
         for culprit in 0..2 {
-            let (crew, begun, ended) = (Crew::default(), AtomicUsize::new(0), AtomicUsize::new(0));
+            let (team, begun, ended) = (Team::default(), AtomicUsize::new(0), AtomicUsize::new(0));
             let dealt = || {
-                crew.together(2, &|| {
+                team.together(2, &|| {
                     begun.fetch_add(1, Ordering::SeqCst);
                     while begun.load(Ordering::SeqCst) < 2 {
                         std::thread::yield_now();
@@ -278,7 +279,7 @@ mod tests {
             assert!(caught.is_err());
             assert_eq!(ended.load(Ordering::SeqCst), 1);
             // The next dealing knows nothing of it.
-            pool.install(|| crew.together(2, &|| ()));
+            pool.install(|| team.together(2, &|| ()));
         }
     }
 }
