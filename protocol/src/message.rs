@@ -221,17 +221,17 @@ impl Said {
     }
 
     /// Whether a worker in cycle `now` may hear this of `cycle`. Neighbours are at most a cycle apart. A vote is waited for by the
-    /// orders that both need two cycles later, and those go to workers that have sent theirs. Who sends a patch or the state of
-    /// ghosts is about to do what others need of its cycle, and any two workers are at most two cycles apart. What is said of the
-    /// ghosts of a gathering takes as long as its plan may.
+    /// orders that both need two cycles later, and those go to workers that have sent theirs. Who sends the state of
+    /// ghosts is about to do what others need of its cycle, and any two workers are at most two cycles apart. A patch, and what is
+    /// said of the ghosts of a gathering, may be on their way for as long as the plan of that gathering is not due.
     pub const fn is_near(&self, cycle: u64, now: u64) -> bool {
         let ahead = cycle.wrapping_sub(now);
         match self.kind() {
             SaidKind::Partials => ahead <= 1,
             SaidKind::Votes => ahead.wrapping_add(1) <= 3,
-            SaidKind::Orders => now.wrapping_sub(cycle) <= 1,
-            SaidKind::Patch | SaidKind::Transfer => ahead.wrapping_add(3) <= 5,
-            SaidKind::Wants | SaidKind::Asked | SaidKind::Shares => {
+            SaidKind::Orders => cycle <= now && now - cycle <= 1,
+            SaidKind::Transfer => ahead.wrapping_add(3) <= 5,
+            SaidKind::Patch | SaidKind::Wants | SaidKind::Asked | SaidKind::Shares => {
                 now.wrapping_sub(cycle).wrapping_add(2) <= u32::MAX as u64
             }
         }

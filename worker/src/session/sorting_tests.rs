@@ -13,6 +13,10 @@ use super::{
 
 /// A worker that shares node 4 with worker 1, in cycle 1, which gathers; workers 1 and 2 are around. Its plan acts in cycle 3.
 fn gathering() -> Session {
+    gathering_with_lag(2)
+}
+
+fn gathering_with_lag(sort_lag: u32) -> Session {
     let mut session = Session::new();
     let neighbours = vec![Neighbour { worker: 1, shared: vec![0] }];
     let around = [1, 2].map(|worker| Around { worker, boxes: Vec::new() }).to_vec();
@@ -21,13 +25,14 @@ fn gathering() -> Session {
     let patch = Patch { nodes: vec![node], faces: Vec::new() };
     let (beside, constraints) = (vec![1], vec![(4, 5)]);
     let sorting = Sorting { patch, around, standing, beside, constraints, ..Sorting::default() };
-    let whole = Assign {
+    let mut whole = Assign {
         route: Route::Direct,
         plan: Plan { exchange: vec![4], neighbours, ..Plan::default() },
         tree: Some(Tree { parent: Some(1), children: Vec::new() }),
         sorting: Some(Box::new(sorting)),
         ..*assign(0)
     };
+    whole.setup.control.sort_lag = sort_lag;
     hear(&mut session, ToWorker::Assign(Box::new(whole)));
     done(&mut session, Outcome::Loaded { vote: None, lanes: "scalar".into() });
     let gathers = Orders { gather: true, ..orders(0) };
@@ -138,6 +143,24 @@ fn a_plan_acts_with_ghosts_that_their_owners_send_and_with_the_exchange_that_sta
     let neighbours: Vec<(u32, Vec<u32>)> =
         plan.neighbours.iter().map(|neighbour| (neighbour.worker, neighbour.shared.clone())).collect();
     assert_eq!(neighbours, [(1, vec![0]), (2, vec![0, 1]), (3, vec![1])]);
+}
+
+#[test]
+fn a_patch_of_a_worker_that_is_no_neighbour_may_be_on_its_way_until_the_plan_is_due() {
+    let mut session = gathering_with_lag(8);
+    done(&mut session, Outcome::Computed);
+    done(&mut session, Outcome::Spread(Vec::new()));
+    let partials = Said::Partials { partials: vec![1.0; 3], aboard: None };
+    session.apply(Event::Peer(1, ToPeer { cycle: 1, what: partials }));
+    session.apply(Event::Peer(1, ToPeer { cycle: 1, what: Said::Orders(orders(2)) }));
+    done(&mut session, vote());
+    for _ in 2..9 {
+        finish_cycle(&mut session);
+    }
+    assert_eq!(session.cycle(), 9);
+    assert!(patch(&mut session, 1, 1, PlacedPatch::default()).is_empty());
+    let sorts = patch(&mut session, 2, 1, PlacedPatch::default());
+    assert!(matches!(sorts[..], [Action::Compute(Task::Sort { gathered_at: 1, .. })]), "{sorts:?}");
 }
 
 #[test]

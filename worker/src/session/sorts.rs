@@ -193,6 +193,9 @@ impl Session {
         if !patch.is_sound(sorts.n_parts) {
             return Err(format!("worker {from} sends a patch in cycle {cycle} that is none"));
         }
+        if sorts.settled.is_some_and(|settled| cycle <= settled) {
+            return Err(format!("worker {from} sends the patch of cycle {cycle}, whose plan is here"));
+        }
         if sorts.heard.len() >= MAX_WAITING * sorts.around.len().max(1) {
             return Err(format!("worker {from} sends a patch in cycle {cycle} while too many wait"));
         }
