@@ -131,7 +131,12 @@ impl Machine {
         Self { clock: ThreadClock { team: Some(team), ..ThreadClock::default() }, ..Self::default() }
     }
 
-    /// Drops the domain.
+    /// The calling thread is in another pool now, which this team keeps awake: places for its threads would go to members in the pool before.
+    pub fn change_team(&mut self, team: Team) {
+        self.clock.team = Some(team);
+    }
+
+    /// Drops the domain, and what has been counted.
     pub fn forget(&mut self) {
         *self = Self { clock: self.clock.afresh(), ..Self::default() };
     }
@@ -141,7 +146,7 @@ impl Machine {
         self.domain.as_ref().map(Domain::load).unwrap_or_default()
     }
 
-    /// Thread-CPU time of its tasks so far, over all epochs of a job.
+    /// Thread-CPU time of its tasks so far, over all epochs of a job; what it takes to load them is not in it.
     pub fn work(&self) -> Work {
         self.clock.work()
     }
@@ -266,8 +271,8 @@ impl Machine {
             None => Width::best(),
         };
         // The domain of the epoch before goes first: there need not be room for two.
-        let further_epoch = self.domain.take().is_some();
-        self.sorter = None;
+        (self.domain, self.sorter) = (None, None);
+        let clock = self.clock.afresh();
         let settings = assign.setup.contact.clone().filter(|_| assign.sorting.is_some());
         let mut domain = Domain::new(
             assign.setup,
@@ -283,13 +288,10 @@ impl Machine {
         }
         domain.place_bodies(&assign.bodies)?;
         domain.watch(&assign.watched);
-        domain.install(&assign.plan, &assign.ghost_state, &self.clock)?;
-        let vote = prepare.then(|| Box::new(domain.prepare(&self.clock)));
+        domain.install(&assign.plan, &assign.ghost_state, &clock)?;
+        let vote = prepare.then(|| Box::new(domain.prepare(&clock)));
         if let Some(sorting) = assign.sorting {
             self.sorter = Some(Sorter::new(*sorting, settings.as_ref(), &domain)?);
-        }
-        if !further_epoch {
-            self.clock = self.clock.afresh();
         }
         self.domain = Some(domain);
         Ok(Outcome::Loaded { vote, lanes: width.to_string() })

@@ -45,8 +45,9 @@ pub struct Runner {
     watch: Watch,
     stopwatch: Stopwatch,
     links: Links,
-    /// Wall-clock time of tasks so far.
-    busy: Duration,
+    /// Wall-clock time of tasks so far, and what of it contact took by the threads' own clocks. The wall clock tells that others
+    /// want the host's cores too; the clocks of threads do not.
+    busy: Work,
     /// The answer to an assignment, while links are being made.
     ready: Option<ToMaster>,
     /// When the last report left.
@@ -70,7 +71,7 @@ impl Runner {
             watch: Watch::default(),
             stopwatch: Stopwatch::new(),
             links,
-            busy: Duration::ZERO,
+            busy: Work::default(),
             ready: None,
             reported: Instant::now(),
             leaving: None,
@@ -84,6 +85,7 @@ impl Runner {
     /// # Errors
     /// Why the connection to the master must end: [`Error::Left`] if it was asked to leave and holds nothing any more.
     pub fn run(&mut self, inputs: &mut mpsc::Receiver<Input>) -> Result<Option<u32>> {
+        self.machine.change_team(Team::default());
         while let Some(input) = awake(|| inputs.try_recv().ok()).or_else(|| inputs.blocking_recv()) {
             match input {
                 Input::Master(header, message) => self.master(&header, message)?,
@@ -227,8 +229,7 @@ impl Runner {
                             let place = runner.place_of(&message);
                             return runner.outbox.send_later(place, move || wire::pack_to_master(&message));
                         }
-                        let worked = share(runner.busy, runner.machine.work());
-                        runner.send(&message.stamped(worked))
+                        runner.send(&message.stamped(runner.busy))
                     })?,
                     Action::SendPeer(to, message) => self.timed(|runner| {
                         if runner.is_report_due() {
@@ -238,11 +239,11 @@ impl Runner {
                     })?,
                     Action::Compute(task) => {
                         let (machine, compute, started) = (&mut self.machine, self.compute, Instant::now());
-                        let cycle = self.session.cycle();
+                        let (cycle, before) = (self.session.cycle(), machine.work());
                         let outcome = catch_unwind(AssertUnwindSafe(|| compute(machine, task, cycle)));
                         // Others see the pause as slowness, and take over.
                         std::thread::sleep(self.share.pause(started.elapsed()));
-                        self.busy += started.elapsed();
+                        book(&mut self.busy, started.elapsed(), (before, self.machine.work()));
                         for lap in self.machine.take_laps() {
                             self.stopwatch.book(self.session.cycle(), lap);
                         }
@@ -270,7 +271,7 @@ impl Runner {
         self.links.report(&mut report);
         report.slow = self.share.words();
         report.cycle = self.session.cycle();
-        report.busy_ns = self.busy.as_nanos() as u64;
+        report.busy_ns = self.busy.compute_ns;
         self.send(&ToMaster::Report(Box::new(report)))
     }
 
@@ -282,12 +283,13 @@ impl Runner {
     }
 }
 
-/// What tasks took on this host, with the share of contact as the threads' own clocks have it. The wall clock tells that
-/// others want the host's cores too; the clocks of threads do not.
-fn share(busy: Duration, threads: Work) -> Work {
-    let busy = busy.as_nanos() as u64;
-    let contact = busy as f64 * threads.contact_ns as f64 / threads.compute_ns.max(1) as f64;
-    Work { compute_ns: busy, contact_ns: contact as u64 }
+/// Books a task that took so long by the wall clock; the clocks of threads before and after it say what part of it was contact.
+fn book(busy: &mut Work, took: Duration, (before, after): (Work, Work)) {
+    let took = took.as_nanos() as u64;
+    let computed = after.compute_ns.saturating_sub(before.compute_ns);
+    let contact = after.contact_ns.saturating_sub(before.contact_ns);
+    busy.compute_ns += took;
+    busy.contact_ns += (took as f64 * contact as f64 / computed.max(1) as f64) as u64;
 }
 
 /// What a panic said.
@@ -380,6 +382,19 @@ mod tests {
             sample: false,
         };
         ToWorker::Totals { cycle, orders, totals: Vec::new() }
+    }
+
+    #[test]
+    fn contact_is_booked_by_the_clocks_of_the_task_alone() {
+        // An hour of a job without contact, then a cycle of 12 ms, a sixth of it contact.
+        let work = |compute_ns, contact_ns| Work { compute_ns, contact_ns };
+        let mut busy = work(3_600_000_000_000, 0);
+        book(&mut busy, Duration::from_millis(12), (work(5_000, 4_000), work(65_000, 14_000)));
+        assert_eq!(busy, work(3_600_012_000_000, 2_000_000));
+        // A task that counts nothing, and one whose machine was made anew.
+        book(&mut busy, Duration::from_millis(1), (work(7, 3), work(7, 3)));
+        book(&mut busy, Duration::from_millis(1), (work(7, 3), work(0, 0)));
+        assert_eq!(busy, work(3_600_014_000_000, 2_000_000));
     }
 
     #[test]

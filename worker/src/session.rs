@@ -100,6 +100,8 @@ pub struct Session {
     busy: bool,
     /// Its outcome is of an epoch or a job that is over.
     outdated: bool,
+    /// What is held is to be forgotten once the task is done: the job is over.
+    released: bool,
     /// An assignment that waits for that task's end.
     next: Option<Box<Assign>>,
     /// Pieces of an assignment to come, with the number of their sub-domain, and its epoch.
@@ -155,6 +157,7 @@ impl Session {
             epoch: 0,
             busy: false,
             outdated: false,
+            released: false,
             next: None,
             coming: (0, Vec::new()),
             cycle: 0,
@@ -249,9 +252,11 @@ impl Session {
 
     /// The task of an epoch or a job that is over has come to its end.
     fn after_outdated(&mut self, actions: &mut Vec<Action>) {
-        match self.next.take() {
-            Some(assign) => self.load(assign, actions),
-            None => actions.push(Action::Forget),
+        if std::mem::take(&mut self.released) {
+            actions.push(Action::Forget);
+        }
+        if let Some(assign) = self.next.take() {
+            self.load(assign, actions);
         }
     }
 
@@ -269,8 +274,8 @@ impl Session {
 
     /// Drops all of the job in hand; a task under way goes on, for nothing.
     fn clear(&mut self) {
-        let (busy, outdated) = (self.busy, self.busy || self.outdated);
-        *self = Self { busy, outdated, ..Self::new() };
+        let (busy, outdated, released) = (self.busy, self.busy || self.outdated, self.released);
+        *self = Self { busy, outdated, released, ..Self::new() };
     }
 
     /// Begins an epoch.
@@ -299,7 +304,8 @@ impl Session {
         match message {
             ToWorker::Release => {
                 self.clear();
-                if !self.busy {
+                self.released = self.busy;
+                if !self.released {
                     actions.push(Action::Forget);
                 }
                 Ok(())

@@ -321,6 +321,15 @@ fn release_forgets_the_job_when_the_task_under_way_is_done() {
 }
 
 #[test]
+fn a_job_that_comes_while_the_last_task_of_another_is_under_way_begins_with_nothing_of_it() {
+    let mut session = in_first_cycle(orders(0));
+    hear(&mut session, ToWorker::Release);
+    assert!(hear(&mut session, ToWorker::Assign(assign(5))).is_empty(), "the interior is under way");
+    let load = done(&mut session, Outcome::Computed);
+    assert!(matches!(load[..], [Action::Forget, Action::Compute(Task::Load { .. })]), "{load:?}");
+}
+
+#[test]
 fn stop_sends_the_image_with_the_last_vote() {
     let mut session = in_first_cycle(Orders { stop: true, ..orders(0) });
     done(&mut session, Outcome::Computed);
@@ -422,6 +431,29 @@ fn a_vote_that_nobody_waits_for_or_that_is_no_number_goes_no_further() {
         matches!(&failed[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains("NaN")),
         "{failed:?}"
     );
+}
+
+#[test]
+fn orders_of_a_worker_that_is_not_above_or_of_another_cycle_are_refused() {
+    let aboard = |orders| partials(Some(Aboard::Orders(orders)));
+    let wrong = [
+        (2, said(0, Said::Orders(orders(1))), "not above"),
+        (1, said(0, Said::Orders(orders(2))), "for cycle 2 where those for cycle 1"),
+        (1, said(1, aboard(orders(2))), "for cycle 2 where those for cycle 1"),
+        (1, said(0, aboard(orders(0))), "for cycle 0"),
+        (1, said(u64::MAX, Said::Orders(orders(u64::MAX))), "worker 1"),
+    ];
+    for (from, message, why) in wrong {
+        let mut session = in_tree(Tree { parent: Some(1), children: vec![(2, true)] });
+        let refused = session.apply(Event::Peer(from, message));
+        assert!(
+            matches!(&refused[..], [Action::Send(ToMaster::Failed { reason, .. })] if reason.contains(why)),
+            "{why}: {refused:?}"
+        );
+    }
+    let mut alone = in_first_cycle(orders(0));
+    let refused = alone.apply(Event::Peer(1, said(0, Said::Orders(orders(1)))));
+    assert!(matches!(&refused[..], [Action::Send(ToMaster::Failed { .. })]), "{refused:?}");
 }
 
 #[test]

@@ -71,12 +71,12 @@ impl Session {
                 }
                 match aboard.map(|aboard| *aboard) {
                     Some(Aboard::Vote(votes)) => self.add_vote(cycle, Some(from), votes, actions)?,
-                    Some(Aboard::Orders(orders)) => self.take_orders(cycle.wrapping_sub(1), orders, actions),
+                    Some(Aboard::Orders(orders)) => self.hear_orders(from, cycle, orders, actions)?,
                     None => {}
                 }
             }
             (_, Said::Votes(votes)) => self.add_vote(cycle, Some(from), votes, actions)?,
-            (_, Said::Orders(orders)) => self.take_orders(cycle, orders, actions),
+            (_, Said::Orders(orders)) => self.hear_orders(from, cycle + 1, orders, actions)?,
             (_, Said::Patch(patch)) => self.hear_patch(from, cycle, patch)?,
             (_, what @ (Said::Wants(_) | Said::Asked(_) | Said::Shares(_))) => {
                 self.hear_of_ghosts(from, cycle, what, actions)?;
@@ -88,6 +88,31 @@ impl Session {
             }
         }
         self.resume_waiting(actions)
+    }
+
+    /// Another worker passes on the orders for cycle `next`.
+    ///
+    /// # Errors
+    /// If it is not the one above this worker in the tree, or they are for another cycle.
+    fn hear_orders(
+        &mut self,
+        from: u32,
+        next: u64,
+        orders: Orders,
+        actions: &mut Vec<Action>,
+    ) -> Result<(), String> {
+        if !self.branch.as_ref().is_some_and(|branch| branch.is_below(from)) {
+            return Err(format!("worker {from} gives orders, but is not above this worker in the tree"));
+        }
+        let answered = next.checked_sub(1).filter(|_| orders.next == next);
+        let answered = answered.ok_or_else(|| {
+            format!(
+                "worker {from} gives orders for cycle {} where those for cycle {next} belong",
+                orders.next
+            )
+        })?;
+        self.take_orders(answered, orders, actions);
+        Ok(())
     }
 
     /// The orders that answer a cycle have come.

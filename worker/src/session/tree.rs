@@ -43,6 +43,11 @@ impl Branch {
         Self { place, n_parts, votes: BTreeMap::new(), held: None }
     }
 
+    /// Whether orders come from this worker.
+    pub(super) fn is_below(&self, other: u32) -> bool {
+        self.place.parent == Some(other)
+    }
+
     /// Adds a vote, of a child or of this worker (`None`); gives those of the branch once all are here.
     fn add(
         &mut self,
@@ -75,7 +80,7 @@ impl Branch {
     /// What goes with the partial forces of `cycle` to a neighbour: to the parent the vote of a worker without children, to a child
     /// the orders that are held for it.
     fn aboard(&mut self, to: u32, own: &mut Option<BranchVote>) -> Option<Box<Aboard>> {
-        if self.place.parent == Some(to) && self.place.children.is_empty() {
+        if self.is_below(to) && self.place.children.is_empty() {
             return own.take().map(|vote| Box::new(Aboard::Vote(vote)));
         }
         let held = self.held.as_mut()?;
@@ -142,7 +147,7 @@ impl Session {
     /// The orders that answer a cycle have come from above: they go on to the children.
     pub(super) fn pass_on(&mut self, answered: u64, orders: &Orders, actions: &mut Vec<Action>) {
         // A child without children needs them to integrate the next cycle, and a neighbour's partial forces of that cycle as well.
-        let follows = self.position() < position_after(answered + 1);
+        let follows = self.position() < position_after(orders.next);
         let is_neighbour = |child: u32| self.neighbours.iter().any(|neighbour| neighbour.worker == child);
         let Some(branch) = &mut self.branch else { return };
         let rides = |&(child, is_leaf): &(u32, bool)| is_leaf && follows && is_neighbour(child);
