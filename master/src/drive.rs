@@ -250,7 +250,11 @@ impl Driver {
         if self.sorting > 0 {
             return Ok(());
         }
-        let Some(waiting) = self.pace.waits_for(self.ends, self.now()) else { return Ok(()) };
+        let now = self.now();
+        for &worker in self.job.at_work() {
+            self.pace.hear_bytes(worker, self.members[worker].link.bytes_received(), now);
+        }
+        let Some(waiting) = self.pace.waits_for(self.ends, now) else { return Ok(()) };
         if self.pace.asks() {
             let at_work = self.job.at_work().iter().map(|&worker| (worker, &self.members[worker].link));
             let asked = at_work.map(|(worker, link)| (worker, link.send(self.place, &ToWorker::Where)));

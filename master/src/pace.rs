@@ -3,7 +3,8 @@
 //! A link's signs of life say that a process lives; they do not say that it computes. Workers go in step: when one stands still, all
 //! others have sent what they can within two cycles, and the job hears nothing more. The worker that is furthest behind is then
 //! *suspect*, and later *late*. Both limits are multiples of the longest silence that the job has outlived, and neither is shorter
-//! than a fixed time, because a PC that swaps is silent for seconds.
+//! than a fixed time, because a PC that swaps is silent for seconds. A message that is long on its way, such as a state over a slow
+//! wire, is no silence: its bytes are heard.
 //!
 //! It reads no clock: times are seconds since the job began, and the caller says when it was busy itself.
 
@@ -17,6 +18,8 @@ const LATE_SILENCES: [f64; 2] = [60.0, 20.0];
 /// What is granted in addition until every worker has sent a cycle (s per element of the problem): sub-domains travel over the
 /// slowest networks at a kilobyte per element.
 const LOAD_SECONDS_PER_ELEMENT: f64 = 2e-4;
+/// Bytes that come from a worker between two looks when only its signs of life do, at most.
+const SIGNS_OF_LIFE: u64 = 1024;
 /// What is left of the longest silence after each cycle, so that one long silence is forgotten within hundreds of cycles.
 const FADING: f64 = 0.99;
 
@@ -40,6 +43,8 @@ struct Place {
     /// 0 when it was dealt its work, 1 when it is ready, `c + 2` when it has sent cycle `c`.
     position: u64,
     heard: f64,
+    /// Bytes of its link at the last look; none before the first.
+    bytes: Option<u64>,
 }
 
 /// The pace of a job.
@@ -63,7 +68,8 @@ impl Pace {
 
     /// An epoch begins with these workers.
     pub fn begin(&mut self, at_work: &[usize], now: f64) {
-        self.places = at_work.iter().map(|&worker| Place { worker, position: 0, heard: now }).collect();
+        self.places =
+            at_work.iter().map(|&worker| Place { worker, position: 0, heard: now, bytes: None }).collect();
         (self.everybody, self.touched) = (0, now);
     }
 
@@ -86,6 +92,16 @@ impl Pace {
         if self.everybody < position {
             self.everybody = position;
             self.longest *= FADING;
+        }
+    }
+
+    /// At a look, so many bytes have come over a worker's link since it stood. Where they are more than signs of life since the last
+    /// look, a message is on its way.
+    pub fn hear_bytes(&mut self, worker: usize, bytes: u64, now: f64) {
+        let Some(place) = self.places.iter_mut().find(|place| place.worker == worker) else { return };
+        let before = place.bytes.replace(bytes);
+        if before.is_some_and(|before| bytes.saturating_sub(before) > SIGNS_OF_LIFE) {
+            self.touched = now;
         }
     }
 
@@ -185,6 +201,29 @@ mod tests {
             }
         }
         assert!(pace.waits_for(false, now + 20.1).is_some_and(|w| w.late));
+    }
+
+    #[test]
+    fn a_state_over_a_slow_wire_is_no_silence_and_signs_of_life_are() {
+        let (mut pace, mut now) = computing(100);
+        let mut bytes = [5_000_000, 5_000_000];
+        for _ in 0..45 {
+            now += 1.0;
+            for (worker, bytes) in [3, 5].into_iter().zip(&mut bytes) {
+                *bytes += 600_000;
+                pace.hear_bytes(worker, *bytes, now);
+            }
+            assert_eq!(pace.waits_for(false, now), None);
+        }
+        // Then worker 5 alone sends, then nobody.
+        for second in 1..21 {
+            now += 1.0;
+            bytes[1] += if second < 10 { 600_000 } else { 40 };
+            pace.hear_bytes(3, bytes[0], now);
+            pace.hear_bytes(5, bytes[1], now);
+        }
+        assert!(pace.waits_for(false, now).is_some_and(|w| w.worker == 3 && !w.late && w.silence == 11.0));
+        assert!(pace.waits_for(false, now + 9.0).is_some_and(|w| w.worker == 3 && w.late));
     }
 
     #[test]
