@@ -8,6 +8,7 @@
 //! partial forces ([`exchange`]) and votes ([`crate::tree`]). Elements that have eroded cost nothing ([`Living`]); they are dealt out all the
 //! same, since their state is still held.
 
+pub mod blocks;
 mod crew;
 mod exchange;
 mod grids;

@@ -304,7 +304,7 @@ impl Job {
             }
             ToMaster::Pieces { cycle, version, pieces } => {
                 if version != WORKER_STATE_VERSION {
-                    return Err(Error::Worker(worker, Breach::ImageVersion(version)));
+                    return Err(Error::Worker(worker, Breach::StateVersion(version)));
                 }
                 if self.epoch.schedule.stops_at(cycle) {
                     let noted = self.twice.note_end((worker, n), &pieces);

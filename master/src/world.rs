@@ -145,7 +145,7 @@ pub trait Surroundings {
         None
     }
 
-    /// How the time of a host went, where that is counted. Asked before its last image is sent.
+    /// How the time of a host went, where that is counted. Asked before its last state is sent.
     fn report(&self, _sessions: &Sessions, _host: usize) -> Option<Report> {
         None
     }

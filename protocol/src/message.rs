@@ -56,10 +56,10 @@ pub enum ToWorker {
         cycle: u64,
         /// What comes next.
         orders: Orders,
-        /// Total forces of this worker's exchange nodes, three numbers each, and of its entries for rigid bodies.
+        /// Total forces of this worker's exchange nodes, as many numbers each as the plan says, and of its entries for rigid bodies.
         totals: Vec<f64>,
     },
-    /// On route master: state of the ghosts of a plan that starts to act, six numbers each.
+    /// On route master: state of the ghosts of a plan that starts to act: of each position, velocity and what contact keeps of it.
     Transfer {
         /// The cycle at which the plan acts.
         cycle: u64,
@@ -131,7 +131,7 @@ pub struct ToPeer {
 pub enum Said {
     /// To each neighbour of the plan.
     Partials {
-        /// Partial forces of the nodes that both hold, three numbers each.
+        /// Partial forces of the nodes that both hold, as many numbers each as the plan says.
         partials: Vec<f64>,
         /// What goes up or down the [`Tree`] and would else be a frame of its own.
         aboard: Option<Box<Aboard>>,
@@ -392,7 +392,7 @@ pub enum ToMaster {
         cycle: u64,
         /// The vote of the whole of the cycle before; none in the first cycle.
         vote: Option<Box<Vote>>,
-        /// Partial forces of the exchange nodes, three numbers each, and of its entries for rigid bodies.
+        /// Partial forces of the exchange nodes, as many numbers each as the plan says, and of its entries for rigid bodies.
         partials: Vec<f64>,
         /// Positions of owned surface nodes where this cycle gathers; else empty.
         gathered: Vec<f64>,
@@ -430,7 +430,7 @@ pub enum ToMaster {
     Transfer {
         /// The cycle at which the plan acts.
         cycle: u64,
-        /// Six numbers by node of the plan's send list.
+        /// By node of the plan's send list: position, velocity and what contact keeps of it.
         state: Vec<f64>,
     },
     /// Some of the pieces of a state at the start of a cycle, in the worker's order.

@@ -183,7 +183,7 @@ impl Machine {
             return self.build(*assign, prepare);
         }
         if let Task::WorkerState { last: true } = task {
-            let domain = self.domain.take().ok_or("an image without an assignment")?;
+            let domain = self.domain.take().ok_or("a state without an assignment")?;
             let pieces = self.laps.time(Phase::Other, || domain.into_pieces());
             return Ok(Outcome::WorkerState { pieces, work: self.clock.work() });
         }

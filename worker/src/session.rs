@@ -56,7 +56,7 @@ enum Phase {
     },
     /// Hashing a sample, with all elements done.
     Sampling,
-    /// After the last image: computing the elements of the cycle that will not be, for a sample of them.
+    /// After the last state: computing the elements of the cycle that will not be, for a sample of them.
     Proving,
     Integrating,
     /// Failed or finished; only `Release` or `Assign` is heard.
@@ -136,7 +136,7 @@ pub struct Session {
     sorts: Option<Sorts>,
     vote: Option<Box<Vote>>,
     resumed: bool,
-    imaged: bool,
+    state_sent: bool,
     /// This cycle's sample is still to be sent.
     sample_due: bool,
     /// The interior was computed with the border: at a plan boundary.
@@ -183,7 +183,7 @@ impl Session {
             sorts: None,
             vote: None,
             resumed: false,
-            imaged: false,
+            state_sent: false,
             sample_due: false,
             whole: false,
         }
@@ -451,7 +451,7 @@ impl Session {
                     self.phase = Phase::Over;
                     return Ok(());
                 }
-                self.imaged = true;
+                self.state_sent = true;
                 self.begin_cycle(actions)
             }
             (Phase::Packing, Outcome::Transferred(state)) => {
@@ -514,7 +514,7 @@ impl Session {
                 self.vote = Some(vote);
                 self.dt_previous = self.dt;
                 self.cycle += 1;
-                self.imaged = false;
+                self.state_sent = false;
                 self.begin_cycle(actions)
             }
             (phase, outcome) => Err(format!("outcome {outcome:?} while {phase:?}")),
@@ -543,7 +543,7 @@ impl Session {
         {
             entry.remove();
         }
-        if (stop || collect) && !self.imaged {
+        if (stop || collect) && !self.state_sent {
             self.phase = Phase::SendingState;
             actions.push(Action::Compute(Task::WorkerState { last: stop && !sample }));
             return Ok(());

@@ -20,7 +20,7 @@ use std::{
 /// How long a member waits for the next dealing: longer than what lies between two dealings where nobody waits for a wire.
 const PATIENCE: Duration = Duration::from_micros(500);
 
-/// An offer of the core to other threads that takes longer than this was accepted by one.
+/// A thread that yields and comes back later than this was not the only one that wanted the core.
 const CONTENDED: Duration = Duration::from_micros(50);
 
 /// Pauses of the processor between two looks, before the core is offered to other threads.
@@ -57,7 +57,8 @@ struct Dealing {
 }
 
 impl Team {
-    /// Has the calling thread and up to `n - 1` members do the same. A member that comes late does nothing.
+    /// Has the calling thread and up to `n - 1` members do the same. A member that comes late does nothing. Not to be called by `work`
+    /// itself, which would be waited for.
     pub fn together(&self, n: usize, work: &(dyn Fn() + Sync)) {
         let shared = &*self.0;
         // SAFETY: `Closing` takes the reference back and waits for every member that has it, on return and on panic: none uses it

@@ -4,13 +4,7 @@ use std::sync::Arc;
 
 use deck::model::Model;
 use mechanics::{
-    cycle::Plan,
-    cycle::Subdomain,
-    exact::Quanta,
-    mesh::Mesh,
-    piece::{self, Region},
-    rigid::switch,
-    state::GlobalState,
+    contact::Census, cycle::Plan, cycle::Subdomain, exact::Quanta, piece, rigid::switch, state::GlobalState,
     vote::Watched,
 };
 use protocol::message::{Assign, ToWorker};
@@ -32,8 +26,8 @@ use super::{
     workers::Workers,
 };
 use crate::{
-    balance::{Base, INTERACTIONS_PER_ELEMENT},
-    decompose::{self, Cut, Fleet, Living, Traits, work},
+    balance::{Base, Costs, INTERACTIONS_PER_ELEMENT},
+    decompose::{self, Cut, Fleet, Living, Traits, blocks, work},
     event::{Action, Deal, WorkerSpec},
     exchange::Exchange,
     node_owners::NodeOwners,
@@ -158,54 +152,12 @@ impl Job {
         let dealt = (layout.as_slice(), bases);
         let division = Division::new((model, n_bodies), dealt, &threads, problem.touching.as_ref());
         let elements = work(&layout, n, 0.0, &Living::new(&model.mesh, alive.as_deref()));
-        let dropped =
-            epoch.sorts.eroded().map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
         if self.options.replay {
-            epoch.samples = Samples::new(blocks_of(&model.mesh, &layout, &threads));
+            epoch.samples = Samples::new(blocks::by_worker(&model.mesh, &layout, &threads));
         }
-        let mut basis = None;
-        let (exchange, interactions) = match (&problem.touching, &model.setup.contact) {
-            (Some(touching), Some(settings)) => {
-                let surface = epoch.sorts.eroded().map(|eroded| eroded.surface(model, state.cycle));
-                let sorter = Sorter::new(
-                    surface.unwrap_or_else(|| Arc::clone(&touching.surface)),
-                    settings.clone(),
-                    Arc::clone(&touching.exclusions),
-                    fleet,
-                    self.options.route(),
-                    self.options.dealing,
-                    costs,
-                    &division.gather,
-                );
-                let what = What::Positions(sorter.positions_of(state));
-                let x = Gathered { cycle: state.cycle, what };
-                let whole = SortBasis {
-                    epoch: number,
-                    sorter,
-                    node_owners: Arc::new(division.node_owners),
-                    state: Arc::clone(state),
-                    dropped,
-                };
-                let sorted = whole.sort(&x);
-                basis = Some(Arc::new(SortBasis { dropped: Vec::new(), ..whole }));
-                self.tally.census = sorted.census;
-                (sorted.exchange, sorted.interactions)
-            }
-            _ => {
-                (Exchange::new(&division.node_owners, vec![None; n], state, self.options.route()), vec![0; n])
-            }
-        };
-        self.tally.imbalance = imbalance(&elements, &interactions, &speeds);
-        let exchange = Arc::new(exchange);
-        let bodies = checkpoint.bodies(problem);
-        let setup = switch::with_formed(&model.setup, &checkpoint.continuation.formed);
-        let gauges: Vec<u32> = model.output.gauges.iter().map(|g| g.node).collect();
-        let watched = Watched {
-            elements: model.output.element_gauges.iter().map(|g| g.element).collect(),
-            contacts: model.output.contact_forces.clone(),
-            sections: model.output.sections.iter().map(|section| section.cut.clone()).collect(),
-            row_cycles: model.output.history_cycles,
-        };
+        let Division { by_worker, node_owners, gather } = division;
+        let First { exchange, interactions, basis, census } =
+            self.first_sort(&epoch, state, (fleet, costs), (node_owners, &gather));
         if let Some(children) = traits.children.filter(|_| trees.is_empty()) {
             let cycle = elements.iter().sum::<f64>() / speeds.iter().sum::<f64>();
             let neighbours = |plan: &Plan| plan.neighbours.iter().map(|other| other.worker).collect();
@@ -217,35 +169,16 @@ impl Job {
             (Some(basis), Some(settings)) if by_workers => {
                 let owners = decompose::owners(&model.mesh, &layout);
                 let (surface, exclusions) = (basis.sorter.surface(), basis.sorter.exclusions());
-                let who = (&owners[..], &division.gather[..], &*basis.node_owners);
+                let who = (&owners[..], &gather[..], &*basis.node_owners);
                 patches::cut(surface, (settings, exclusions), who, state)
             }
             _ => Vec::new(),
         };
-        for (position, share) in division.by_worker.into_iter().enumerate() {
-            let Share { subdomains, n_pieces, blocks } = share;
-            let cuttings = Cutting::of(state, number, blocks);
+        for (position, (dealt, mut assign)) in self.assignments(number, by_worker, &exchange).enumerate() {
+            assign.tree = trees.get(position).cloned();
+            assign.sorting = sortings.get_mut(position).map(|sorting| Box::new(std::mem::take(sorting)));
+            let cuttings = Cutting::of(state, number, dealt);
             actions.extend(cuttings.map(|cutting| Action::Pieces(at_work[position], cutting)));
-            let assign = Assign {
-                epoch: number,
-                setup: setup.clone(),
-                n_parts: model.mesh.parts.len() as u32,
-                quanta: Quanta { force: checkpoint.continuation.quanta[0], ..problem.quanta },
-                subdomains,
-                n_pieces,
-                gauges: gauges.clone(),
-                watched: watched.clone(),
-                lanes: self.options.asked.lanes.clone(),
-                cycle: state.cycle,
-                dt_previous: checkpoint.continuation.dt_previous,
-                route: self.options.route(),
-                plan: exchange.plans[position].clone(),
-                plan_hash: exchange.hash,
-                ghost_state: exchange.ghost_state_from(position, state),
-                bodies: bodies.clone(),
-                tree: trees.get(position).cloned(),
-                sorting: sortings.get_mut(position).map(|sorting| Box::new(std::mem::take(sorting))),
-            };
             actions.push(Action::Send(at_work[position], ToWorker::Assign(Box::new(assign))));
         }
         actions.push(Action::Dealt(
@@ -255,6 +188,8 @@ impl Job {
                 .map(|(spec, &e)| Deal { name: spec.name.clone(), speed: spec.speed, elements: e as u64 })
                 .collect(),
         ));
+        self.tally.imbalance = imbalance(&elements, &interactions, &speeds);
+        self.tally.census = census.unwrap_or(self.tally.census);
         epoch.sorts.begin(state.cycle, (basis, by_workers), exchange);
         epoch.inflow = Inflow::new(n, checkpoint.continuation.vote.clone());
         epoch.meter = Meter::new(n);
@@ -264,6 +199,104 @@ impl Job {
         epoch.shares = Shares { speeds, regions, elements, layout, held };
         Ok(epoch)
     }
+
+    /// The exchange that an epoch begins with: where bodies may touch, that of a sort of the state.
+    fn first_sort(
+        &self,
+        epoch: &Epoch,
+        state: &Arc<GlobalState>,
+        (fleet, costs): (Fleet<'_>, Costs),
+        (node_owners, gather): (NodeOwners, &[Vec<u32>]),
+    ) -> First {
+        let model = &self.problem.model;
+        let (Some(touching), Some(settings)) = (&self.problem.touching, &model.setup.contact) else {
+            let n = fleet.speeds.len();
+            let exchange = Exchange::new(&node_owners, vec![None; n], state, self.options.route());
+            return First {
+                exchange: Arc::new(exchange),
+                interactions: vec![0; n],
+                basis: None,
+                census: None,
+            };
+        };
+        let eroded = epoch.sorts.eroded();
+        let surface = eroded.map(|eroded| eroded.surface(model, state.cycle));
+        let dropped = eroded.map(|eroded| eroded.dropped(model, state.cycle)).unwrap_or_default();
+        let sorter = Sorter::new(
+            surface.unwrap_or_else(|| Arc::clone(&touching.surface)),
+            settings.clone(),
+            Arc::clone(&touching.exclusions),
+            fleet,
+            self.options.route(),
+            self.options.dealing,
+            costs,
+            gather,
+        );
+        let x = Gathered { cycle: state.cycle, what: What::Positions(sorter.positions_of(state)) };
+        let (node_owners, state) = (Arc::new(node_owners), Arc::clone(state));
+        let whole = SortBasis { epoch: epoch.number, sorter, node_owners, state, dropped };
+        let sorted = whole.sort(&x);
+        First {
+            exchange: Arc::new(sorted.exchange),
+            interactions: sorted.interactions,
+            census: Some(sorted.census),
+            basis: Some(Arc::new(SortBasis { dropped: Vec::new(), ..whole })),
+        }
+    }
+
+    /// By worker the blocks that it is dealt, and its assignment without them, without its place in the tree and its part of sorts.
+    fn assignments<'a>(
+        &'a self,
+        epoch: u32,
+        by_worker: Vec<Share>,
+        exchange: &'a Exchange,
+    ) -> impl Iterator<Item = (Vec<Block>, Assign)> + 'a {
+        let (problem, checkpoint) = (&self.problem, self.checkpoints.newest());
+        let (model, state) = (&problem.model, &checkpoint.state);
+        let bodies = checkpoint.bodies(problem);
+        let setup = switch::with_formed(&model.setup, &checkpoint.continuation.formed);
+        let output = &model.output;
+        let watched = Watched {
+            elements: output.element_gauges.iter().map(|g| g.element).collect(),
+            contacts: output.contact_forces.clone(),
+            sections: output.sections.iter().map(|section| section.cut.clone()).collect(),
+            row_cycles: output.history_cycles,
+        };
+        by_worker.into_iter().enumerate().map(move |(position, share)| {
+            let Share { subdomains, n_pieces, blocks } = share;
+            let assign = Assign {
+                epoch,
+                setup: setup.clone(),
+                n_parts: model.mesh.parts.len() as u32,
+                quanta: Quanta { force: checkpoint.continuation.quanta[0], ..problem.quanta },
+                subdomains,
+                n_pieces,
+                gauges: output.gauges.iter().map(|g| g.node).collect(),
+                watched: watched.clone(),
+                lanes: self.options.asked.lanes.clone(),
+                cycle: state.cycle,
+                dt_previous: checkpoint.continuation.dt_previous,
+                route: self.options.route(),
+                plan: exchange.plans[position].clone(),
+                plan_hash: exchange.hash,
+                ghost_state: exchange.ghost_state_from(position, state),
+                bodies: bodies.clone(),
+                tree: None,
+                sorting: None,
+            };
+            (blocks, assign)
+        })
+    }
+}
+
+/// What an epoch begins with.
+struct First {
+    exchange: Arc<Exchange>,
+    /// Pairs that each worker looks at.
+    interactions: Vec<u64>,
+    /// What later sorts need, and what the first one counted; none where nothing can touch.
+    basis: Option<Arc<SortBasis>>,
+    census: Option<Census>,
 }
 
 /// Which elements are alive in a state; none where nothing can erode.
@@ -302,7 +335,7 @@ impl Division {
             NodeOwners::new(model.mesh.n_nodes(), bases, layout, &nodes_of).with_bodies(n_bodies);
         let mut gather: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut by_worker: Vec<Share> = (0..n).map(|_| Share::default()).collect();
-        let regions = blocks(&model.mesh, layout, threads);
+        let regions = blocks::of_layout(&model.mesh, layout, threads);
         for (((id, place), nodes), regions) in (0..).zip(layout).zip(&nodes_of).zip(regions) {
             let is_unowned = |&node: &u32| node_owners.owner_subdomain[node as usize] != id;
             let unowned = nodes.iter().copied().filter(is_unowned).collect();
@@ -321,40 +354,6 @@ impl Division {
         }
         Self { by_worker, node_owners, gather }
     }
-}
-
-/// Blocks for each thread of a worker that has several: whoever is free takes the next, so that unequal blocks and unequal cores
-/// come out even.
-const BLOCKS: usize = 4;
-
-/// Elements of a block below which its nodes, which other blocks have too, cost more than an even share gains.
-const ELEMENTS: usize = 2000;
-
-/// Elements that a block has at most, but for one that rounding gives it: pieces travel by blocks.
-const MOST: usize = 250_000;
-
-/// The blocks of each sub-domain: of a worker with several threads at least one for each, in proportion to the elements, and of each
-/// form of elements one of its own.
-fn blocks(mesh: &Mesh, layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<Region>> {
-    let mut elements = vec![0; threads.len()];
-    layout.iter().for_each(|subdomain| elements[subdomain.worker] += subdomain.region.n_elements());
-    let of_subdomain = |subdomain: &decompose::Subdomain| {
-        let (all, threads) = (elements[subdomain.worker].max(1), threads[subdomain.worker].max(1) as usize);
-        let n = if threads > 1 { (all / ELEMENTS).clamp(threads, BLOCKS * threads) } else { 1 };
-        let n = n.max(all.div_ceil(MOST));
-        let regions = subdomain.region.split((n * subdomain.region.n_elements()).div_ceil(all).max(1));
-        regions.into_iter().flat_map(|region| region.by_form(&mesh.parts[subdomain.part])).collect()
-    };
-    layout.iter().map(of_subdomain).collect()
-}
-
-/// By worker: part and elements of each of its blocks, in the worker's order.
-fn blocks_of(mesh: &Mesh, layout: &[decompose::Subdomain], threads: &[u32]) -> Vec<Vec<(usize, Region)>> {
-    let mut by_worker = vec![Vec::new(); threads.len()];
-    for (subdomain, regions) in layout.iter().zip(blocks(mesh, layout, threads)) {
-        by_worker[subdomain.worker].extend(regions.into_iter().map(|region| (subdomain.part, region)));
-    }
-    by_worker
 }
 
 /// Largest over mean of cost over speed, workers without a speed aside.

@@ -125,7 +125,7 @@ pub enum Breach {
     /// A report with numbers that cannot be.
     Report(String),
     /// States of another version.
-    ImageVersion(u32),
+    StateVersion(u32),
     /// A state of so many elements, from a worker that holds others.
     Elements { cycle: u64, elements: u64, held: u64 },
     /// It says twice that it is ready.
@@ -275,14 +275,14 @@ impl Breach {
                 write!(f, "worker {worker} writes to worker {to}, there are {workers}")
             }
             Self::Report(why) => write!(f, "worker {worker}: {why}"),
-            Self::ImageVersion(version) => write!(
+            Self::StateVersion(version) => write!(
                 f,
-                "worker {worker} sends images of version {version}, this master reads {WORKER_STATE_VERSION}"
+                "worker {worker} sends states of version {version}, this master reads {WORKER_STATE_VERSION}"
             ),
             Self::Elements { cycle, elements, held } => {
                 write!(
                     f,
-                    "worker {worker} sends {elements} elements in its image of cycle {cycle}, it holds {held}"
+                    "worker {worker} sends {elements} elements in its state of cycle {cycle}, it holds {held}"
                 )
             }
             Self::ReadyTwice => write!(f, "worker {worker} is ready twice"),
@@ -309,7 +309,7 @@ impl Breach {
                 let what = match sent {
                     Sent::Frame => "",
                     Sent::Positions => "positions of ",
-                    Sent::WorkerState => "its image of ",
+                    Sent::WorkerState => "its state of ",
                     Sent::Sample => "its sample of ",
                     Sent::Sort => "its sort of ",
                 };
@@ -319,7 +319,7 @@ impl Breach {
                 let what = match sent {
                     Sent::Frame => "a frame",
                     Sent::Positions => "positions",
-                    Sent::WorkerState => "an image",
+                    Sent::WorkerState => "a state",
                     Sent::Sample => "a sample",
                     Sent::Sort => "a sort",
                 };

@@ -394,7 +394,7 @@ fn a_force_beyond_exact_sums_is_computed_again_by_others_and_ends_the_job_if_the
 }
 
 #[test]
-fn images_of_another_version_are_refused_with_both_versions() {
+fn states_of_another_version_are_refused_with_both_versions() {
     let (mut job, _) = started(1);
     let version = WORKER_STATE_VERSION + 1;
     let actions = job.apply(Event::Message(0, 0, ToMaster::Pieces { cycle: 1, version, pieces: Vec::new() }));

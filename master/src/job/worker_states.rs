@@ -137,7 +137,7 @@ mod tests {
     use super::{super::tests::job, *};
 
     #[test]
-    fn images_become_a_state_when_the_last_is_here_and_none_that_nobody_asked_for() {
+    fn pieces_become_a_state_when_the_last_is_here_and_none_that_nobody_asked_for() {
         let (job, _) = job(2);
         let mut worker_states = WorkerStates::default();
         worker_states.order(8, 0.25, true);

@@ -33,7 +33,7 @@ fn name(kind: Kind) -> &'static str {
         Kind::Border => "contact and border",
         Kind::Interior => "interior",
         Kind::Integrate => "integrate",
-        Kind::WorkerState => "image",
+        Kind::WorkerState => "state",
         Kind::Sort => "sort",
         Kind::Send => "send",
         Kind::Receive => "receive",

@@ -29,7 +29,7 @@ pub fn cases() -> Vec<Case> {
             killed_of_six(s, "die-in-spread:2")
         }),
         case("one of six that sort, killed while it sorts", 1, |s, _| killed_of_six(s, "die-in-sort:2")),
-        case("worker killed while it sends its image for a snapshot", 1, |s, _| {
+        case("worker killed while it sends its state for a snapshot", 1, |s, _| {
             killed_in(s, "die-in-image:2")
         }),
         case("second worker killed during the rollback for the first", 1, |scene, k| {

@@ -55,7 +55,7 @@ pub enum Task {
         plan: Box<Plan>,
         /// Where workers sort themselves: the gathering whose own sort is the plan's batch, and who is around now.
         sorted: Option<(u64, Vec<Around>)>,
-        /// Six numbers by ghost.
+        /// By ghost: position, velocity and what contact keeps of it.
         ghost_state: Vec<f64>,
         /// The step before.
         dt_previous: f64,
@@ -84,7 +84,7 @@ pub enum Task {
     },
     /// Totals in place, integrate.
     Integrate {
-        /// Three numbers by node of the exchange.
+        /// As many numbers as the plan says by node of the exchange.
         totals: Vec<f64>,
         /// The step before.
         dt_previous: f64,
@@ -131,11 +131,11 @@ pub enum Outcome {
         /// Lane width in use.
         lanes: String,
     },
-    /// Of `Transfer`: six numbers by node.
+    /// Of `Transfer`: by node position, velocity and what contact keeps of it.
     Transferred(Vec<f64>),
     Computed,
     Forces {
-        /// Three numbers by node of the exchange.
+        /// As many numbers as the plan says by node of the exchange.
         partials: Vec<f64>,
         /// Three numbers by owned surface node, if asked for.
         gathered: Vec<f64>,

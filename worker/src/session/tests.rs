@@ -141,7 +141,7 @@ fn a_sample_is_taken_once_between_the_elements_and_integration() {
 }
 
 #[test]
-fn after_the_last_image_a_sample_is_computed_of_the_cycle_that_will_not_be() {
+fn after_the_last_state_a_sample_is_computed_of_the_cycle_that_will_not_be() {
     let mut session = in_first_cycle(Orders { stop: true, sample: true, ..orders(0) });
     done(&mut session, Outcome::Computed);
     hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });
@@ -330,7 +330,7 @@ fn a_job_that_comes_while_the_last_task_of_another_is_under_way_begins_with_noth
 }
 
 #[test]
-fn stop_sends_the_image_with_the_last_vote() {
+fn stop_sends_the_state_with_the_last_vote() {
     let mut session = in_first_cycle(Orders { stop: true, ..orders(0) });
     done(&mut session, Outcome::Computed);
     hear(&mut session, ToWorker::Totals { cycle: 0, orders: orders(1), totals: vec![0.0; 3] });

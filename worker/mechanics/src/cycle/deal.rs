@@ -1,7 +1,7 @@
-//! Work of a cycle, dealt to the threads of the current pool.
+//! Work of a cycle, dealt to threads ([`Meter::together`]).
 //!
 //! Whoever is free takes the next item, so that a thread that is slow, or kept from its core, holds up the others by one item at
-//! most. Nothing here allocates.
+//! most.
 
 use std::sync::{Mutex, PoisonError};
 
