@@ -23,6 +23,7 @@ pub mod format;
 pub mod formats;
 pub mod hdf5;
 pub mod history;
+pub mod plot;
 pub mod report;
 pub mod summary;
 pub mod sums;

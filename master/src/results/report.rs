@@ -3,8 +3,6 @@
 //! Curves are drawn from `history.csv` as it stands on disk, tables from the summary; so a report says nothing that the
 //! other files do not.
 
-#![expect(clippy::disallowed_methods, reason = "ticks of a plot")]
-
 use std::fmt::Write as _;
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
@@ -12,21 +10,13 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use super::{
     Error, Folder, HISTORY, REPORT, Summary, Units,
     history::{HistoryRow, Table},
+    plot::{Curve, Plot, entry},
     summary::significant,
     write_whole,
 };
 
 /// Points of a curve at most: more than a screen has columns.
 const MOST_POINTS: usize = 800;
-/// A plot's width and height, and the room left of and below its area (px).
-const PLOT: [f64; 2] = [720.0, 260.0];
-const MARGIN: [f64; 2] = [76.0, 34.0];
-
-/// A curve: what it is called, and its points.
-struct Curve {
-    name: String,
-    points: Vec<[f64; 2]>,
-}
 
 /// A picture of the report: what is on it, and the PNG.
 pub struct Picture {
@@ -133,99 +123,21 @@ fn thinned(all: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points
 }
 
-/// Round numbers that lie between two, about five of them.
-pub(crate) fn ticks(low: f64, high: f64) -> Vec<f64> {
-    let raw = (high - low) / 5.0;
-    if !raw.is_finite() || raw <= 0.0 {
-        return vec![low];
-    }
-    let power = 10_f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|step| *step >= raw).unwrap_or(raw);
-    let first = (low / step).ceil() as i64;
-    (first..)
-        .map(|i| i as f64 * step)
-        .take_while(|tick| *tick <= high * (1.0 + 1e-12) || *tick == 0.0)
-        .take(12)
-        .collect()
-}
-
-/// A tick's number without the zeros that say nothing.
-pub(crate) fn label(tick: f64) -> String {
-    let text = significant(tick);
-    let (number, exponent) = text.split_once('e').map_or((text.as_str(), None), |(n, e)| (n, Some(e)));
-    let number =
-        if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
-    exponent.map_or_else(|| number.to_owned(), |exponent| format!("{number}e{exponent}"))
-}
-
 fn plot(curves: &[Curve], time: &str) -> String {
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let range = |axis: usize, start: [f64; 2]| {
         points().fold(start, |[low, high], p| [low.min(p[axis]), high.max(p[axis])])
     };
-    let [left, right] = range(0, [f64::INFINITY, f64::NEG_INFINITY]);
     // Zero belongs to a scale of energies and speeds: without it small changes look large.
-    let [low, high] = range(1, [0.0, 0.0]);
-    let span = |low: f64, high: f64| if high > low { high - low } else { 1.0 };
-    let x = |t: f64| MARGIN[0] + (t - left) / span(left, right) * (PLOT[0] - MARGIN[0] - 8.0);
-    let y = |v: f64| 8.0 + (high - v) / span(low, high) * (PLOT[1] - MARGIN[1] - 8.0);
-    let mut svg = format!("<svg viewBox=\"0 0 {} {}\" role=\"img\">\n", PLOT[0], PLOT[1]);
-    for tick in ticks(low, high) {
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\" stroke=\"var(--line)\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-            MARGIN[0],
-            PLOT[0] - 8.0,
-            MARGIN[0] - 6.0,
-            y(tick) + 4.0,
-            label(tick),
-            y = y(tick)
-        );
+    let ranges = [range(0, [f64::INFINITY, f64::NEG_INFINITY]), range(1, [0.0, 0.0])];
+    let mut plot = Plot::new(ranges, &format!("time [{time}]"));
+    for (index, curve) in curves.iter().enumerate() {
+        plot.line(index, curve);
     }
-    for tick in ticks(left, right) {
-        let _ = writeln!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
-            x(tick),
-            PLOT[1] - MARGIN[1] + 16.0,
-            label(tick)
-        );
-    }
-    let _ = writeln!(
-        svg,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">time [{}]</text>",
-        PLOT[0] - 8.0,
-        PLOT[1] - 3.0,
-        escaped(time)
-    );
-    for (i, curve) in curves.iter().enumerate() {
-        let mut path = String::new();
-        for p in &curve.points {
-            let _ = write!(path, "{:.1},{:.1} ", x(p[0]), y(p[1]));
-        }
-        let _ = writeln!(
-            svg,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"var(--c{})\" stroke-width=\"1.6\"{}><title>{}</title></polyline>",
-            path.trim_end(),
-            i % 7,
-            // Beyond seven colours curves are told apart by dashes.
-            if i < 7 { "" } else { " stroke-dasharray=\"5 3\"" },
-            escaped(&curve.name)
-        );
-    }
-    svg.push_str("</svg>\n<p>");
-    for (i, curve) in curves.iter().enumerate() {
+    plot.end(curves.iter().enumerate().map(|(index, curve)| {
         let last = curve.points.last().map_or(0.0, |p| p[1]);
-        let _ = write!(
-            svg,
-            "<span style=\"color:var(--c{})\">&#9644;</span> {} <small>{}</small>&ensp; ",
-            i % 7,
-            escaped(&curve.name),
-            significant(last)
-        );
-    }
-    svg.push_str("</p>\n");
-    svg
+        format!("{} <small>{}</small>", entry(index, curve), significant(last))
+    }))
 }
 
 /// How the time of the workers went, and what was dealt out anew or lost.
@@ -267,20 +179,6 @@ pub(crate) fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn ticks_are_round_and_lie_between() {
-        assert_eq!(ticks(0.0, 10.0), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
-        assert_eq!(ticks(-1.0, 1.0), [-1.0, -0.5, 0.0, 0.5, 1.0]);
-        assert_eq!(ticks(3.0, 3.0), [3.0]);
-        assert!(ticks(0.0, 7.3e-9).len() >= 3);
-        assert!(ticks(f64::NEG_INFINITY, f64::INFINITY).len() <= 12);
-    }
-
-    #[test]
-    fn labels_keep_what_zeros_say() {
-        assert_eq!([0.0, 50.0, 0.25, 4e-4, 2e9].map(label), ["0", "50", "0.25", "4e-4", "2e9"]);
-    }
 
     #[test]
     fn a_long_curve_keeps_its_ends() {

@@ -10,12 +10,15 @@ use super::{
     prepare::command,
     table::{self, Outcome, Outcomes, heading, told},
 };
-use crate::results::report::{STYLE, escaped, label, ticks};
+use crate::results::{
+    plot::{Curve, Plot, colour, entry, label},
+    report::{STYLE, escaped},
+};
 
 pub const PAGE: &str = "study.html";
-/// A plot's width and height, and the room left of and below its area (px).
-const PLOT: [f64; 2] = [720.0, 280.0];
-const MARGIN: [f64; 2] = [76.0, 40.0];
+/// A map's width, and the room left of it (px).
+const WIDTH: f64 = 720.0;
+const MARGIN: f64 = 76.0;
 /// Curves of a plot at most; more than this nobody tells apart.
 const MOST_CURVES: usize = 14;
 /// Rows of the table of runs at most; `table.csv` has all.
@@ -25,12 +28,6 @@ const MOST_CELLS: usize = 60;
 
 /// A set of parameters' values as a key: their bits order as they stand in the table.
 type Key = Vec<u64>;
-
-struct Curve {
-    name: String,
-    /// Abscissa, value, and the interval of perturbations around it.
-    points: Vec<[f64; 2]>,
-}
 
 /// The page.
 pub fn page(study: &Study, outcomes: &Outcomes) -> String {
@@ -197,90 +194,38 @@ fn plot(study: &Study, outcomes: &Outcomes, along: usize, measure: usize) -> Str
     let range = |axis: usize| {
         points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], p| [a.min(p[axis]), b.max(p[axis])])
     };
-    let ([left, right], [low, high]) = (range(0), range(1));
     if points.is_empty() {
         return String::new();
     }
-    let span = |low: f64, high: f64| if high > low { high - low } else { 1.0 };
-    let x = |t: f64| MARGIN[0] + (t - left) / span(left, right) * (PLOT[0] - MARGIN[0] - 14.0);
-    let y = |v: f64| 8.0 + (high - v) / span(low, high) * (PLOT[1] - MARGIN[1] - 8.0);
-    let mut svg = format!("<svg viewBox=\"0 0 {} {}\" role=\"img\">\n", PLOT[0], PLOT[1]);
-    for tick in ticks(low, high) {
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\" stroke=\"var(--line)\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-            MARGIN[0],
-            PLOT[0] - 14.0,
-            MARGIN[0] - 8.0,
-            y(tick) + 4.0,
-            label(tick),
-            y = y(tick)
-        );
-    }
-    for tick in ticks(left, right) {
-        let _ = writeln!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
-            x(tick),
-            PLOT[1] - MARGIN[1] + 18.0,
-            label(tick)
-        );
-    }
     let parameter = &study.parameters[along];
-    let _ = writeln!(
-        svg,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-        PLOT[0] - 14.0,
-        PLOT[1] - 4.0,
-        escaped(&heading(&parameter.name, &parameter.unit))
-    );
+    let mut plot = Plot::new([range(0), range(1)], &heading(&parameter.name, &parameter.unit));
     for (index, at, least, greatest) in bars {
+        let (x, low, high) = (plot.x(at), plot.y(least), plot.y(greatest));
         let _ = writeln!(
-            svg,
-            "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"{1:.1}\" y2=\"{2:.1}\" stroke=\"var(--c{3})\" stroke-width=\"1.2\"/>",
-            x(at),
-            y(least),
-            y(greatest),
-            index % 7
+            plot.svg,
+            "<line x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{low:.1}\" y2=\"{high:.1}\" stroke=\"{}\" stroke-width=\"1.2\"/>",
+            colour(index)
         );
     }
-    for (i, curve) in curves.iter().enumerate() {
-        let mut path = String::new();
-        for p in &curve.points {
-            let _ = write!(path, "{:.1},{:.1} ", x(p[0]), y(p[1]));
-        }
-        let dashes = if i < 7 { "" } else { " stroke-dasharray=\"5 3\"" };
-        let colour = i % 7;
-        let _ = writeln!(
-            svg,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"var(--c{colour})\" stroke-width=\"1.6\"{dashes}/>",
-            path.trim_end()
-        );
-        for p in &curve.points {
-            let title = format!("{} {}, {}: {}", parameter.name, label(p[0]), curve.name, label(p[1]));
+    for (index, curve) in curves.iter().enumerate() {
+        plot.line(index, curve);
+        for &[at, value] in &curve.points {
+            let title = format!("{} {}, {}: {}", parameter.name, label(at), curve.name, label(value));
+            let (x, y) = (plot.x(at), plot.y(value));
             let _ = writeln!(
-                svg,
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"var(--c{colour})\"><title>{}</title></circle>",
-                x(p[0]),
-                y(p[1]),
+                plot.svg,
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{}\"><title>{}</title></circle>",
+                colour(index),
                 escaped(&title)
             );
         }
     }
-    svg.push_str("</svg>\n<p>");
-    for (i, curve) in curves.iter().enumerate().filter(|(_, curve)| !curve.name.is_empty()) {
-        let _ = write!(
-            svg,
-            "<span style=\"color:var(--c{})\">&#9644;</span> {}&ensp; ",
-            i % 7,
-            escaped(&curve.name)
-        );
-    }
-    if n_all > MOST_CURVES {
-        let _ = write!(svg, "and {} more in {}", n_all - MOST_CURVES, table::TABLE);
-    }
-    svg.push_str("</p>\n");
-    svg
+    let named = curves.iter().enumerate().filter(|(_, curve)| !curve.name.is_empty());
+    let others = n_all
+        .checked_sub(MOST_CURVES)
+        .filter(|&others| others > 0)
+        .map(|others| format!("and {others} more in {}", table::TABLE));
+    plot.end(named.map(|(index, curve)| entry(index, curve)).chain(others))
 }
 
 /// The measure over two parameters that form a grid, as coloured cells with their numbers in titles.
@@ -300,16 +245,16 @@ fn map(study: &Study, outcomes: &Outcomes, along: usize, measure: usize) -> Stri
     if high <= low {
         return String::new();
     }
-    let wide = (PLOT[0] - MARGIN[0] - 14.0) / columns.len() as f64;
+    let wide = (WIDTH - MARGIN - 14.0) / columns.len() as f64;
     let tall = (wide * 0.5).clamp(14.0, 36.0);
     let height = tall * by_others.len() as f64;
-    let mut svg = format!("<svg viewBox=\"0 0 {} {:.0}\" role=\"img\">\n", PLOT[0], height + 24.0);
+    let mut svg = format!("<svg viewBox=\"0 0 {} {:.0}\" role=\"img\">\n", WIDTH, height + 24.0);
     for (r, (key, row)) in by_others.iter().rev().enumerate() {
         let top = tall * r as f64;
         let _ = writeln!(
             svg,
             "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-            MARGIN[0] - 8.0,
+            MARGIN - 8.0,
             top + tall / 2.0 + 4.0,
             key.iter().map(|bits| label(number(*bits))).collect::<String>()
         );
@@ -319,7 +264,7 @@ fn map(study: &Study, outcomes: &Outcomes, along: usize, measure: usize) -> Stri
             let _ = writeln!(
                 svg,
                 "<rect x=\"{:.1}\" y=\"{top:.1}\" width=\"{wide:.1}\" height=\"{tall:.1}\" fill=\"var(--c0)\" fill-opacity=\"{:.3}\"><title>{} {}, {}: {}</title></rect>",
-                MARGIN[0] + wide * c as f64,
+                MARGIN + wide * c as f64,
                 0.05 + 0.9 * share,
                 escaped(&study.parameters[along].name),
                 label(*at),
@@ -332,7 +277,7 @@ fn map(study: &Study, outcomes: &Outcomes, along: usize, measure: usize) -> Stri
         let _ = writeln!(
             svg,
             "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
-            MARGIN[0] + wide * (c as f64 + 0.5),
+            MARGIN + wide * (c as f64 + 0.5),
             height + 16.0,
             label(number(*bits))
         );
