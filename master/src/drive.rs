@@ -252,7 +252,7 @@ impl Driver {
         }
         let now = self.now();
         for &worker in self.job.at_work() {
-            self.pace.hear_bytes(worker, self.members[worker].link.bytes_received(), now);
+            self.pace.hear_bytes(worker, self.members[worker].link.bytes(), now);
         }
         let Some(waiting) = self.pace.waits_for(self.ends, now) else { return Ok(()) };
         if self.pace.asks() {

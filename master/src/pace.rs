@@ -4,7 +4,7 @@
 //! others have sent what they can within two cycles, and the job hears nothing more. The worker that is furthest behind is then
 //! *suspect*, and later *late*. Both limits are multiples of the longest silence that the job has outlived, and neither is shorter
 //! than a fixed time, because a PC that swaps is silent for seconds. A message that is long on its way, such as a state over a slow
-//! wire, is no silence: its bytes are heard.
+//! wire, is no silence: its bytes are counted.
 //!
 //! It reads no clock: times are seconds since the job began, and the caller says when it was busy itself.
 
@@ -15,10 +15,10 @@ const LATE_SECONDS: [f64; 2] = [20.0, 5.0];
 /// The same limits as multiples of the longest silence so far.
 const SUSPECT_SILENCES: f64 = 20.0;
 const LATE_SILENCES: [f64; 2] = [60.0, 20.0];
-/// What is granted in addition until every worker has sent a cycle (s per element of the problem): sub-domains travel over the
-/// slowest networks at a kilobyte per element.
+/// What is granted in addition until every worker has sent a cycle (s per element of the problem): sub-domains are cut, unpacked and
+/// made ready.
 const LOAD_SECONDS_PER_ELEMENT: f64 = 2e-4;
-/// Bytes that come from a worker between two looks when only its signs of life do, at most.
+/// Bytes that travel on the link of a worker between two looks when only signs of life do, at most.
 const SIGNS_OF_LIFE: u64 = 1024;
 /// What is left of the longest silence after each cycle, so that one long silence is forgotten within hundreds of cycles.
 const FADING: f64 = 0.99;
@@ -95,8 +95,8 @@ impl Pace {
         }
     }
 
-    /// At a look, so many bytes have come over a worker's link since it stood. Where they are more than signs of life since the last
-    /// look, a message is on its way.
+    /// At a look, so many bytes have travelled on a worker's link since it stood. Where they are more than signs of life since the last
+    /// look, a message is on its way, to it or from it.
     pub fn hear_bytes(&mut self, worker: usize, bytes: u64, now: f64) {
         let Some(place) = self.places.iter_mut().find(|place| place.worker == worker) else { return };
         let before = place.bytes.replace(bytes);

@@ -74,12 +74,8 @@ impl WorkerLink {
         self.outbox.lock().unwrap_or_else(PoisonError::into_inner).sender().clone()
     }
 
-    /// That have come from it since the link stood.
-    pub(super) fn bytes_received(&self) -> u64 {
-        self.sender().counters().bytes_received
-    }
-
-    fn bytes(&self) -> u64 {
+    /// That have travelled since the link stood, both ways.
+    pub(super) fn bytes(&self) -> u64 {
         let counters = self.sender().counters();
         counters.bytes_sent + counters.bytes_received
     }
