@@ -4,11 +4,12 @@
 //! 2. a run in which nothing moves, that ends before anything meets, or goes on long after; a gap of contact that makes it long;
 //! 3. bodies that meet without contact, and bodies that meet nothing;
 //! 4. cells too flat, or too coarse for what strikes them;
-//! 5. symmetry planes that a body straddles, or at which it is not held.
+//! 5. symmetry planes that a body straddles, or at which it is not held;
+//! 6. parts whose forces are lost beside those of another.
 
 use std::{collections::BTreeSet, ops::RangeInclusive};
 
-use mechanics::{material::Strength, wall::Motion};
+use mechanics::{initial::force_references, material::Strength, wall::Motion};
 
 use super::{
     Closing, Measured, TRAVEL,
@@ -45,6 +46,9 @@ const LEAST_CYCLES: f64 = 10.0;
 const FLATTEST: f64 = 30.0;
 /// Cells of what is struck across what strikes it.
 const CELLS_ACROSS: f64 = 1.9;
+/// Force of an element of one part over that of another beyond which sums of forces have too few digits for the weaker: 21 of the 42 bits are left, so
+/// stresses of a hundred thousandth of the modulus have three digits.
+const STRONGER: f64 = (1_u64 << 21) as f64;
 /// States of a run that fill a disk.
 const MOST_STATES: f64 = 5_000.0;
 
@@ -64,6 +68,7 @@ pub(super) fn of(
     meetings(model, measured, &bodies, &mut doubts);
     cells(model, measured, &mut doubts);
     symmetry(model, measured, &mut doubts);
+    digits(model, &mut doubts);
     // Two parts may share a plane.
     let mut told = BTreeSet::new();
     doubts.retain(|doubt| told.insert(doubt.clone()));
@@ -339,6 +344,26 @@ fn cells(model: &Model, measured: &[Measured], doubts: &mut Vec<String>) {
                 part.name,
                 part.element_ids[element],
                 short(ratio.round())
+            ));
+        }
+    }
+}
+
+/// Check 6.
+fn digits(model: &Model, doubts: &mut Vec<String>) {
+    let forces = force_references(&model.mesh, &model.setup);
+    let Some((p, greatest)) = (0..).zip(&forces).max_by(|a: &(usize, _), b| f64::total_cmp(a.1, b.1)) else {
+        return;
+    };
+    let name = |p: usize| &model.mesh.parts[p].name;
+    for (q, force) in forces.iter().enumerate().filter(|(_, force)| **force > 0.0) {
+        let ratio = greatest / force;
+        if ratio > STRONGER {
+            doubts.push(format!(
+                "an element of part {:?} can push {ratio:.0e} times as hard as one of part {:?}, whose forces then have few digits in the sums of the run; give {:?} smaller cells, or make it rigid",
+                name(p),
+                name(q),
+                name(p)
             ));
         }
     }

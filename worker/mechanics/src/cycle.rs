@@ -290,6 +290,7 @@ impl Domain {
             dt_previous,
             dt,
             time: self.time,
+            cycle: self.cycle,
             constraints: &setup.constraints,
             walls: &setup.walls,
             poses: &self.poses,

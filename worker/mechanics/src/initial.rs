@@ -314,6 +314,9 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
 ///
 /// Springs have no modulus: their force and energy are those at an elongation of their length, of which the energy counts by a tenth, and the
 /// momentum is that which this energy gives to all mass.
+///
+/// Parts of bodies that stay rigid have no inner forces ([`inert`]). A steel floor of a few cells would otherwise leave nothing of the forces in a
+/// sheet: with faces of 16 m2 the quantum is about 1 N.
 pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     let speed2 = state.v.iter().map(|v| v.iter().map(|c| c * c).sum::<f64>()).fold(0.0, f64::max);
     let curves = &setup.loads.curves;
@@ -370,7 +373,8 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
     // Energy of springs that are drawn by their length.
     let mut drawn = 0.0;
     let mut index = 0;
-    for part in &mesh.parts {
+    let inert = inert(mesh, setup);
+    for (p, part) in mesh.parts.iter().enumerate() {
         if let Topology::Springs { spring, .. } = &part.topology {
             for at in index..index + part.n_elements() {
                 let length = state.initial_volume[at];
@@ -385,38 +389,13 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         let material = &setup.materials[part.material as usize];
         let modulus = material.wave_modulus();
         sound = sound.max((modulus / material.density).sqrt());
-        let strength = modulus.max(material.density * top_speed2).max(pressure);
-        // Force and arm of an element.
-        let of_element = |e: usize| {
-            let x = part.corners_at(e, &mesh.positions);
-            match &part.topology {
-                Topology::Structured { .. }
-                | Topology::Explicit { .. }
-                | Topology::EightPoint { .. }
-                | Topology::Tetrahedra { .. } => [largest_face(&x) * strength, 0.0],
-                // A shell pulls with its section; only loads act on its face.
-                Topology::Shells { section, thicknesses, .. } => {
-                    let area = largest_face(&x);
-                    let thickness = section.thickness_of(thicknesses, e);
-                    let force = (area.sqrt() * thickness * strength).max(area * pressure);
-                    [force, area.sqrt()]
-                }
-                Topology::Trusses { area, .. } => [area * strength, 0.0],
-                Topology::Springs { .. } => [0.0; 2],
-                Topology::Beams { section, .. } => {
-                    [section.area * strength, part.volume(e, &x) / section.area]
-                }
-            }
-        };
-        // Maxima have no order; the sum of energies has one.
-        let [of_part, longest] = (0..part.n_elements())
-            .into_par_iter()
-            .map(of_element)
-            .reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+        let strength = if inert[p] { 0.0 } else { modulus.max(material.density * top_speed2) };
+        let [of_part, longest] = force_and_arm(part, &mesh.positions, strength, pressure);
         (force, arm) = (force.max(of_part), arm.max(longest));
         for _ in 0..part.n_elements() {
             let energy = state.elements[field::ENERGY][index];
-            stored += (1e-3 * material.bulk()).max(energy) * state.initial_volume[index];
+            let least = if inert[p] { 0.0 } else { 1e-3 * material.bulk() };
+            stored += least.max(energy) * state.initial_volume[index];
             driven2 = driven2.max(2.0 * energy / material.density);
             index += 1;
         }
@@ -434,6 +413,64 @@ pub fn quanta(mesh: &Mesh, setup: &Setup, state: &GlobalState) -> Quanta {
         momentum: Quantum::for_reference(total_mass * top_speed2.max(driven2).sqrt().max(least), 50),
         arm: if arm > 0.0 { Quantum::for_reference(arm, 0).value() } else { 1.0 },
     }
+}
+
+/// Greatest force of an element of a part whose material resists with `strength` under loads of `pressure`, and the greatest arm of moments of one that
+/// turns its nodes. Maxima have no order.
+fn force_and_arm(part: &Part, positions: &[[f64; 3]], strength: f64, pressure: f64) -> [f64; 2] {
+    let of_element = |e: usize| {
+        let x = part.corners_at(e, positions);
+        match &part.topology {
+            Topology::Structured { .. }
+            | Topology::Explicit { .. }
+            | Topology::EightPoint { .. }
+            | Topology::Tetrahedra { .. } => [largest_face(&x) * strength.max(pressure), 0.0],
+            // A shell pulls with its section; only loads act on its face.
+            Topology::Shells { section, thicknesses, .. } => {
+                let area = largest_face(&x);
+                let thickness = section.thickness_of(thicknesses, e);
+                let force = (area.sqrt() * thickness * strength.max(pressure)).max(area * pressure);
+                [force, area.sqrt()]
+            }
+            Topology::Trusses { area, .. } => [area * strength.max(pressure), 0.0],
+            Topology::Springs { .. } => [0.0; 2],
+            Topology::Beams { section, .. } => {
+                [section.area * strength.max(pressure), part.volume(e, &x) / section.area]
+            }
+        }
+    };
+    (0..part.n_elements())
+        .into_par_iter()
+        .map(of_element)
+        .reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])])
+}
+
+/// By part the force of an element that resists with its modulus; none of springs and of [`inert`] parts. Quanta follow from the greatest of them, so
+/// forces in a part with a far smaller one have few digits.
+pub fn force_references(mesh: &Mesh, setup: &Setup) -> Vec<f64> {
+    let inert = inert(mesh, setup);
+    let of_part = |(part, inert): (&Part, bool)| {
+        let modulus = setup.materials[part.material as usize].wave_modulus();
+        force_and_arm(part, &mesh.positions, if inert { 0.0 } else { modulus }, 0.0)[0]
+    };
+    mesh.parts.iter().zip(inert).map(of_part).collect()
+}
+
+/// By part whether it belongs to a body that is rigid for the whole run and that may touch no other such body: what pushes it comes from parts
+/// that deform, from loads and from walls. None, where nothing deforms.
+fn inert(mesh: &Mesh, setup: &Setup) -> Vec<bool> {
+    let body_of = |part: u32| setup.bodies.iter().position(|body| body.parts.binary_search(&part).is_ok());
+    let bodies: Vec<Option<usize>> = (0..mesh.parts.len() as u32).map(body_of).collect();
+    let meets = |p: usize, q: usize| {
+        let [a, b] = [p as u32, q as u32];
+        bodies[q].is_some()
+            && bodies[q] != bodies[p]
+            && setup.contact.as_ref().is_some_and(|contact| contact.permits(a, b) || contact.permits(b, a))
+    };
+    let all = 0..bodies.len();
+    let inert = all.clone().map(|p| bodies[p].is_some() && !all.clone().any(|q| meets(p, q)));
+    let inert: Vec<bool> = inert.collect();
+    if inert.iter().all(|&inert| inert) { vec![false; inert.len()] } else { inert }
 }
 
 /// Area of the largest face of a hexahedron.

@@ -16,7 +16,7 @@ use crate::{
     lanes::{Lane, SET, Width, dispatch::Task},
     load::Loads,
     wall::{Pose, RigidWall, WallVote},
-    work::Work,
+    work::{self, Work},
 };
 use tally::Tally;
 
@@ -74,6 +74,8 @@ pub struct Advance<'a> {
     pub dt: f64,
     /// `t_n` (time).
     pub time: f64,
+    /// `n`.
+    pub cycle: u64,
     /// What acts on single nodes; entry 0 is nothing.
     pub constraints: &'a [Constraint],
     /// All walls; a node's constraint says which it feels.
@@ -90,7 +92,7 @@ pub struct Advance<'a> {
 /// surface nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Booked {
-    /// `sum 1/2 m v_{n-1/2} . v_{n+1/2}`: the kinetic energy at `t_n`. In the first cycle of a run `1/2 m v_0^2`.
+    /// The kinetic energy at `t_n`, see [`crate::work`]. In the first cycle of a run `1/2 m v_0^2`.
     pub kinetic: f64,
     /// Work done on the nodes by prescribed velocities, walls, forces, gravity and relaxation.
     pub external: Work,
@@ -144,7 +146,7 @@ impl Advance<'_> {
     }
 
     /// From `t_{n-1/2}` to `t_{n+1/2}` (time).
-    fn half_steps(&self) -> f64 {
+    pub(crate) fn half_steps(&self) -> f64 {
         0.5 * (self.dt_previous + self.dt)
     }
 
@@ -153,13 +155,8 @@ impl Advance<'_> {
         self.loads.loss(self.time, self.half_steps())
     }
 
-    /// Whether no step has led to `x_n`: velocities before are those of `t_n`.
-    fn is_first(&self) -> bool {
-        self.dt_previous == 0.0
-    }
-
     /// Share of the time from `t_{n-1/2}` to `t_{n+1/2}` that lies before `t_n`.
-    fn share_before(&self) -> f64 {
+    pub(crate) fn share_before(&self) -> f64 {
         share_before(self.dt_previous, self.dt)
     }
 
@@ -288,21 +285,19 @@ impl Advance<'_> {
         let booked = L::mask(u32::from(set.booked));
         let energy = L::splat(self.quanta.energy.magic());
         if body.is_some() {
-            let half_impulse = change.scaled(L::splat(0.5) * mass);
-            let [before, after] = tally.body_work;
-            let (earlier, later) = (half_impulse.dot(&old), half_impulse.dot(&new));
-            tally.body_work = [
-                before + L::select(booked, rounded(earlier, energy), zero),
-                after + L::select(booked, rounded(later, energy), zero),
-            ];
+            let impulse = change.scaled(mass);
+            let quantum = self.quanta.energy.dithered(self.cycle);
+            let halves = work::halves([impulse.dot(&old), impulse.dot(&new)], self.share_before());
+            for (sum, half) in tally.body_work.iter_mut().zip(halves) {
+                *sum = *sum + L::select(booked, quantum.round_lanes(half), zero);
+            }
         }
-        let after = if self.is_first() { &old } else { &new };
-        let kinetic = L::splat(0.5) * mass * old.dot(after);
+        let share = self.share_before();
+        let passed = Vector { x: new.x - old.x, y: new.y - old.y, z: new.z - old.z };
+        let kinetic = L::splat(0.5) * mass * old.dot(&passed.mul_add(L::splat(2.0 * share), &old));
         tally.kinetic = tally.kinetic + L::select(booked, rounded(kinetic, energy), zero);
         let momentum = L::splat(self.quanta.momentum.magic());
-        let share = L::splat(self.share_before());
-        let passed = Vector { x: new.x - old.x, y: new.y - old.y, z: new.z - old.z };
-        let carried = passed.mul_add(share, &old).scaled(mass);
+        let carried = passed.mul_add(L::splat(share), &old).scaled(mass);
         tally.momentum.x = tally.momentum.x + L::select(booked, rounded(carried.x, momentum), zero);
         tally.momentum.y = tally.momentum.y + L::select(booked, rounded(carried.y, momentum), zero);
         tally.momentum.z = tally.momentum.z + L::select(booked, rounded(carried.z, momentum), zero);

@@ -184,6 +184,8 @@ pub struct Advance<'a> {
     pub dt: f64,
     /// `t_n` (time).
     pub time: f64,
+    /// `n`.
+    pub cycle: u64,
     /// Curves, nodal forces, gravity, relaxation.
     pub loads: &'a Loads,
     /// Quanta of the sums.
@@ -193,7 +195,7 @@ pub struct Advance<'a> {
 /// What a body says of a step, each number rounded to its quantum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Booked {
-    /// Kinetic energy at `t_n`: `1/2 m v_{n-1/2} . v_{n+1/2}` and the same of the turning.
+    /// Kinetic energy at `t_n`, see [`crate::work`], and that of the turning.
     pub kinetic: f64,
     /// Work of gravity, relaxation, nodal forces and whatever prescribes its motion.
     pub external: Work,
@@ -337,13 +339,13 @@ impl Advance<'_> {
     pub fn booked(&self, body: &Body, free: &Free, impulse: &Impulse, old: &State, new: &State) -> Booked {
         let Quanta { energy, momentum: of_momentum, .. } = self.quanta;
         let (velocity, momentum) = (new.velocity, new.momentum);
-        let [translation, rotation] = if self.dt_previous == 0.0 {
-            [dot(old.velocity, old.velocity), dot(old.spin, old.momentum)]
-        } else {
-            [dot(old.velocity, velocity), 0.5 * (dot(old.spin, momentum) + dot(new.spin, old.momentum))]
-        };
-        let kinetic = 0.5 * body.mass.mul_add(translation, rotation);
         let share = share_before(self.dt_previous, self.dt);
+        // As of nodes, see `crate::work`.
+        let at_share = |old: f64, between: f64| (2.0 * share).mul_add(between - old, old);
+        let translation = at_share(dot(old.velocity, old.velocity), dot(old.velocity, velocity));
+        let turning = 0.5 * (dot(old.spin, momentum) + dot(new.spin, old.momentum));
+        let rotation = at_share(dot(old.spin, old.momentum), turning);
+        let kinetic = 0.5 * body.mass.mul_add(translation, rotation);
         let carried = |a: usize| body.mass * (velocity[a] - old.velocity[a]).mul_add(share, old.velocity[a]);
         let work = |with_velocity: [f64; 3], with_spin: [f64; 3]| {
             let along = |a: usize| {
@@ -351,11 +353,12 @@ impl Advance<'_> {
                 body.mass * (velocity[a] - pushed) * with_velocity[a]
             };
             let about = |a: usize| (momentum[a] - (free.twisted[a] + impulse.angular[a])) * with_spin[a];
-            energy.round((0..3).map(|a| 0.5 * (along(a) + about(a))).sum())
+            (0..3).map(|a| along(a) + about(a)).sum::<f64>()
         };
+        let products = [work(old.velocity, old.spin), work(velocity, new.spin)];
         Booked {
             kinetic: energy.round(kinetic),
-            external: Work { before: work(old.velocity, old.spin), after: work(velocity, new.spin) },
+            external: Work::of(products, share, energy.dithered(self.cycle)),
             momentum: [0, 1, 2].map(|a| of_momentum.round(carried(a))),
         }
     }

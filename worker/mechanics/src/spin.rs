@@ -7,7 +7,7 @@ use crate::{
     exact::rounded,
     lanes::{Lane, SET, Width, dispatch::Task},
     nodes::{Advance, NodeSet},
-    work::Work,
+    work::{self, Work},
 };
 
 /// Rotations of the nodes of a block, by local node and padded as its other arrays are.
@@ -134,6 +134,7 @@ impl Turn<'_, '_> {
         let (zero, half, energy) =
             (L::splat(0.0), L::splat(0.5), L::splat(self.advance.quanta.energy.magic()));
         let half_steps = L::splat(0.5 * (self.advance.dt_previous + self.advance.dt));
+        let share = self.advance.share_before();
         // SAFETY: the caller's promise.
         let inertia = unsafe { L::load(&self.turning.inertia, at) };
         let scale = half_steps / inertia;
@@ -147,8 +148,8 @@ impl Turn<'_, '_> {
             if loss > 0.0 {
                 let change = L::splat(-loss) * old;
                 new = new + change;
-                before = before + half * change * old;
-                after = after + half * change * new;
+                before = before + change * old;
+                after = after + change * new;
             }
             new = L::select(L::mask(u32::from(clamped[axis])), zero, new);
             // SAFETY: as above.
@@ -156,16 +157,19 @@ impl Turn<'_, '_> {
                 new.store(w, at);
                 zero.store(m, at);
             }
-            product = old.mul_add(if self.advance.dt_previous == 0.0 { old } else { new }, product);
+            product = old.mul_add((new - old).mul_add(L::splat(2.0 * share), old), product);
             axis += 1;
         }
         let booked = L::mask(u32::from(booked));
         let kinetic = rounded(half * inertia * product, energy);
         sums.kinetic = sums.kinetic + L::select(booked, kinetic, zero);
         if loss > 0.0 {
-            let [earlier, later] = [rounded(inertia * before, energy), rounded(inertia * after, energy)];
-            sums.work[0] = sums.work[0] + L::select(booked, earlier, zero);
-            sums.work[1] = sums.work[1] + L::select(booked, later, zero);
+            let quantum = self.advance.quanta.energy.dithered(self.advance.cycle);
+            for (sum, half) in
+                sums.work.iter_mut().zip(work::halves([inertia * before, inertia * after], share))
+            {
+                *sum = *sum + L::select(booked, quantum.round_lanes(half), zero);
+            }
         }
     }
 }
@@ -196,6 +200,7 @@ mod tests {
                 dt_previous: 1e-4,
                 dt: 3e-4,
                 time: 0.0,
+                cycle: 7,
                 constraints: &constraints,
                 walls: &[],
                 poses: &[],
@@ -222,7 +227,8 @@ mod tests {
                     let new = if constraint[node] == 1 && axis != 1 { 0.0 } else { free };
                     assert!((w[axis][node] - new).abs() < 1e-12 * (1.0 + new.abs()), "{node} {axis}");
                     if booked {
-                        energy += 0.5 * inertia[node] * old * new;
+                        // A quarter of the time between the velocities lies before `t_n`.
+                        energy += 0.5 * inertia[node] * old * (0.5 * old + 0.5 * new);
                         done += 0.5 * inertia[node] * (kept - 1.0) * old * (old + free);
                     }
                 }

@@ -136,8 +136,8 @@ pub fn time_step(frequency2: f64) -> f64 {
 pub fn react(
     push: &Push,
     sliding: Option<&Sliding>,
-    force_quantum: Quantum,
-    energy_quantum: Quantum,
+    (force_quantum, energy_quantum): (Quantum, Quantum),
+    cycle: u64,
 ) -> Reaction {
     let normal = push.spring.force;
     let n = push.direction;
@@ -147,7 +147,7 @@ pub fn react(
         for a in 0..3 {
             force[a] = (-drag).mul_add(v[a], force[a]);
         }
-        friction = energy_quantum.round(taken);
+        friction = energy_quantum.dithered(cycle).round(taken);
     }
     let energy = energy_quantum.round(push.spring.energy);
     reaction(push, force, energy, friction, force_quantum)
@@ -158,8 +158,8 @@ pub fn react(
 pub(super) fn react_held(
     push: &Push,
     held: &Held,
-    force_quantum: Quantum,
-    energy_quantum: Quantum,
+    (force_quantum, energy_quantum): (Quantum, Quantum),
+    cycle: u64,
 ) -> Reaction {
     let normal = push.spring.force;
     let mut force = [0.0; 3];
@@ -167,7 +167,7 @@ pub(super) fn react_held(
         force[a] = normal.mul_add(push.direction[a], held.force[a]);
     }
     let energy = energy_quantum.round(push.spring.energy + held.stored);
-    reaction(push, force, energy, energy_quantum.round(held.taken), force_quantum)
+    reaction(push, force, energy, energy_quantum.dithered(cycle).round(held.taken), force_quantum)
 }
 
 /// Puts the force of a hit on its node and corners.

@@ -421,7 +421,7 @@ impl NodeFace {
                     inverse_mass,
                     dt: cycle.dt,
                 });
-                force::react(&push, sliding.as_ref(), quanta.0, quanta.1)
+                force::react(&push, sliding.as_ref(), quanta, cycle.history.cycle)
             };
             vote.count(&reaction);
             let parts = (self.part[node], self.parts[face]);

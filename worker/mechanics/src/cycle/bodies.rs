@@ -177,7 +177,7 @@ impl Domain {
     pub(super) fn move_bodies(&mut self, totals: &[f64], dt_previous: f64, dt: f64) {
         let stride = self.stride();
         let (time, loads, quanta) = (self.time, &self.setup.loads, self.quanta);
-        let advance = rigid::Advance { dt_previous, dt, time, loads, quanta };
+        let advance = rigid::Advance { dt_previous, dt, time, cycle: self.cycle, loads, quanta };
         let bodies = &self.setup.bodies;
         if self.sends_pushes {
             for (b, held) in self.bodies.iter_mut().enumerate() {
@@ -196,9 +196,6 @@ impl Domain {
         for (b, held) in self.bodies.iter_mut().enumerate() {
             held.state = advance.moved(&bodies[b], &free[b], &impulses[b], &states[b]);
             held.booked = advance.booked(&bodies[b], &free[b], &impulses[b], &states[b], &held.state);
-            if dt_previous == 0.0 {
-                held.booked.external.put_off();
-            }
         }
     }
 

@@ -147,12 +147,7 @@ impl HeldBlock {
             self.booked.external.merge(external);
         }
         if !self.faces.is_empty() {
-            let half_steps = 0.5 * (advance.dt_previous + advance.dt);
-            let work = face::work(&self.faces, block, half_steps, advance.quanta.energy);
-            self.booked.external.merge(work);
-        }
-        if advance.dt_previous == 0.0 {
-            self.booked.external.put_off();
+            self.booked.external.merge(face::work(&self.faces, block, advance));
         }
         if self.eroding.as_mut().is_some_and(Eroding::take_change) {
             // Loads leave with the faces of eroded elements.

@@ -71,7 +71,8 @@ impl World {
         for _ in 0..steps {
             let dt_previous = if self.time == 0.0 { 0.0 } else { DT };
             let quanta = Quanta { force: fine, energy: fine, momentum: fine, arm: 1.0 };
-            let advance = Advance { dt_previous, dt: DT, time: self.time, loads: &self.loads, quanta };
+            let advance =
+                Advance { dt_previous, dt: DT, time: self.time, cycle: 0, loads: &self.loads, quanta };
             let free = |(body, state)| advance.free(body, &Push::default(), state);
             let free: Vec<Free> = self.bodies.iter().zip(&self.states).map(free).collect();
             let moving =

@@ -10,6 +10,7 @@ use crate::{
     exact::Quantum,
     material::Material,
     mesh::FACES,
+    nodes::Advance,
     setup::Control,
     vectors::{cross, dot},
     work::Work,
@@ -180,9 +181,10 @@ fn damper_limit(x: &[[f64; 3]; 8], together: f64, speed: f64, damping: f64) -> f
     2.0 / (damped + damped.mul_add(damped, 4.0 * rate * rate).sqrt())
 }
 
-/// Work of the loads in the step around the time at which they acted: their power with half the velocities before and
-/// half of those after, times `half_steps`, the mean of the two steps. A sum of terms rounded to `quantum`.
-pub(crate) fn work(faces: &[LoadedFace], block: &Block, half_steps: f64, quantum: Quantum) -> Work {
+/// Work of the loads in the step around the time at which they acted.
+pub(crate) fn work(faces: &[LoadedFace], block: &Block, advance: &Advance<'_>) -> Work {
+    let (half_steps, share) = (advance.half_steps(), advance.share_before());
+    let quantum = advance.quanta.energy.dithered(advance.cycle);
     let mut sum = Work::default();
     for face in faces {
         let after: f64 = face
@@ -191,8 +193,7 @@ pub(crate) fn work(faces: &[LoadedFace], block: &Block, half_steps: f64, quantum
             .zip(&face.force)
             .map(|(&n, f)| f[0] * block.v[0][n] + f[1] * block.v[1][n] + f[2] * block.v[2][n])
             .sum();
-        let [before, after] = [face.power, after].map(|power| quantum.round(0.5 * half_steps * power));
-        sum.merge(Work { before, after });
+        sum.merge(Work::of([face.power, after].map(|power| half_steps * power), share, quantum));
     }
     sum
 }

@@ -133,7 +133,7 @@ impl Advance<'_> {
                     let vote = &mut nodes.walls[self.walls.len() + usize::from(support)];
                     let impulse = mass * (new[axis] - before);
                     vote.impulse[axis] -= self.quanta.momentum.round(impulse);
-                    vote.work.merge(self.halves(0.5 * impulse * old[axis], 0.5 * impulse * new[axis]));
+                    vote.work.merge(self.work(impulse * old[axis], impulse * new[axis]));
                 }
             }
             let mut walls = held.walls;
@@ -156,11 +156,8 @@ impl Advance<'_> {
                 continue;
             }
             if booked && new != free {
-                let with = |v: [f64; 3]| {
-                    let work = (0..3).map(|a| 0.5 * mass * (new[a] - free[a]) * v[a]).sum::<f64>();
-                    self.quanta.energy.round(work)
-                };
-                external.merge(Work { before: with(old), after: with(new) });
+                let with = |v: [f64; 3]| (0..3).map(|a| mass * (new[a] - free[a]) * v[a]).sum::<f64>();
+                external.merge(self.work(with(old), with(new)));
             }
             for a in 0..3 {
                 velocity[a][lane] = new[a];
@@ -177,19 +174,14 @@ impl Advance<'_> {
         for a in 0..3 {
             vote.impulse[a] -= self.quanta.momentum.round(impulse[a]);
         }
-        let half = |v: [f64; 3]| (0..3).map(|a| 0.5 * impulse[a] * v[a]).sum::<f64>();
-        let done = half(*speed);
-        vote.work.merge(self.halves(done, done));
-        vote.loss.merge(self.halves(done - half(old), done - half(new)));
+        let with = |v: [f64; 3]| (0..3).map(|a| impulse[a] * v[a]).sum::<f64>();
+        let done = with(*speed);
+        vote.work.merge(self.work(done, done));
+        vote.loss.merge(self.work(done - with(old), done - with(new)));
     }
 
-    /// Work before `t_n` and after it, rounded; all of it is after the start of a run.
-    fn halves(&self, before: f64, after: f64) -> Work {
-        let [before, after] = [before, after].map(|half| self.quanta.energy.round(half));
-        let mut work = Work { before, after };
-        if self.is_first() {
-            work.put_off();
-        }
-        work
+    /// Work of an impulse in this step, from its products with the velocities before and after it.
+    fn work(&self, with_old: f64, with_new: f64) -> Work {
+        Work::of([with_old, with_new], self.share_before(), self.quanta.energy.dithered(self.cycle))
     }
 }

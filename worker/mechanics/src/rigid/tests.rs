@@ -56,6 +56,7 @@ fn advance(loads: &Loads, time: f64, dt: f64) -> Advance<'_> {
         dt_previous: dt,
         dt,
         time,
+        cycle: 0,
         loads,
         quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
     }

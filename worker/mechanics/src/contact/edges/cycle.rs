@@ -145,7 +145,7 @@ impl Edges {
                 for a in 0..3 {
                     force[a] = (-drag).mul_add(v[a], force[a]);
                 }
-                friction = cycle.energy_quantum.round(taken);
+                friction = cycle.energy_quantum.dithered(cycle.history.cycle).round(taken);
             }
         }
         let energy = spring.energy;

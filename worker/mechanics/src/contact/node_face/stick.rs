@@ -51,7 +51,7 @@ impl NodeFace {
         push: &Push,
         mut sticking: Sticking,
         (node, is_deepest): (usize, bool),
-        (force_quantum, energy_quantum): (Quantum, Quantum),
+        quanta: (Quantum, Quantum),
         history: &mut History,
     ) -> Reaction {
         let first = self.settings.first_of_stick();
@@ -63,6 +63,6 @@ impl NodeFace {
         if keeps {
             history.after_mut(node)[first..first + 3].copy_from_slice(&held.elongation);
         }
-        force::react_held(push, &held, force_quantum, energy_quantum)
+        force::react_held(push, &held, quanta, history.cycle)
     }
 }

@@ -121,7 +121,7 @@ fn slowly(contact: &NodeFace, cycle: Cycle<'_>) -> ContactVote {
                 dt: cycle.dt,
             };
             let sliding = (sliding.coefficient > 0.0).then_some(&sliding);
-            let reaction = force::react(&push, sliding, cycle.force_quantum, cycle.energy_quantum);
+            let reaction = force::react(&push, sliding, (cycle.force_quantum, cycle.energy_quantum), 0);
             vote.count(&reaction);
             for a in 0..3 {
                 cycle.f[a][n] += reaction.node[a];
