@@ -9,7 +9,7 @@ use super::{
     Domain,
     bodies::Held,
     ghosts::Ghosts,
-    held_block::{HeldBlock, Order, Share},
+    held_block::{HeldBlock, Order, SharedNodes},
     sharing::{Exchange, Groups},
 };
 use crate::{
@@ -73,7 +73,7 @@ impl HeldBlock {
             eroding,
             cuts: Cuts::default(),
             contact_history,
-            shared: Share::default(),
+            shared: SharedNodes::default(),
             led: Vec::new(),
         };
         held_block.mark_strikes(setup);

@@ -45,7 +45,7 @@ pub(super) struct HeldBlock {
     /// What contact keeps of each node, by number; no array where it keeps nothing.
     pub contact_history: Vec<Vec<f64>>,
     /// Its nodes with other holders.
-    pub shared: Share,
+    pub shared: SharedNodes,
     /// Its nodes of rigid bodies.
     pub led: Vec<Led>,
 }
@@ -163,7 +163,7 @@ impl HeldBlock {
 
 /// Nodes of a block that have other holders.
 #[derive(Default)]
-pub(super) struct Share {
+pub(super) struct SharedNodes {
     /// Local node and place, in the exchange.
     pub exchanged: Vec<[u32; 2]>,
     /// Likewise among the totals of groups.
@@ -174,7 +174,7 @@ pub(super) struct Share {
     pub kept: Vec<[u32; 3]>,
 }
 
-impl Share {
+impl SharedNodes {
     /// None yet; `n_shares` of contact.
     pub fn clear(&mut self, n_shares: usize) {
         self.exchanged.clear();

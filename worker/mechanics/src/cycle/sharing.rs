@@ -1,7 +1,7 @@
 //! Total forces of nodes that several arrays hold: blocks, shares of contact, ghosts, other workers.
 //!
 //! What holds a node is one of its *holders*. They are added up in two steps, so that threads need no locks: totals are computed
-//! from what all holders have, which nobody changes meanwhile; then each block takes its own ([`Share`](super::held_block::Share)). A node of the
+//! from what all holders have, which nobody changes meanwhile; then each block takes its own ([`SharedNodes`](super::held_block::SharedNodes)). A node of the
 //! [`Exchange`] has holders on other workers too, so what its holders here come to travels between the two steps. The
 //! other nodes that several blocks have stand in [`Groups`] by who their holders are, and are added up in plain loops. A
 //! node of one block that contact has too needs no total: its block adds what contact has. All terms are exact, so no
