@@ -93,7 +93,7 @@ pub(super) fn make(
             Some(clearance.map_or(most, |d| (FIT_SHARE * d).clamp(FIT_LEAST * face, most)))
         }
         (Gap::Fit, None) => None,
-        _ => fixed_gap(contact, smallest, log),
+        _ => fixed_gap(contact, smallest, thinnest(assembly, &interacts), log),
     };
     let slack = match contact.slack {
         Slack::Default => gap.map(|gap| default_slack(gap, smallest)),
@@ -188,12 +188,12 @@ fn widest_fit(assembly: &Assembly, interacts: &[bool], face: f64) -> f64 {
     thinnest(assembly, interacts).map_or(GAP_FRACTION * face, |h| 0.5 * h.min(face))
 }
 
-/// A gap that does not fit itself.
-fn fixed_gap(contact: &Contact, smallest: Option<f64>, log: &Log<'_>) -> Option<f64> {
+/// A gap that does not fit itself, for the smallest face dimension and the least thickness of shells.
+fn fixed_gap(contact: &Contact, smallest: Option<f64>, thinnest: Option<f64>, log: &Log<'_>) -> Option<f64> {
     match contact.gap {
         Gap::Fit | Gap::Default => smallest.map(|face| GAP_FRACTION * face),
         Gap::Fraction(fraction, origin) => of_fraction(fraction, origin, smallest, log),
-        Gap::Length(length, origin) => of_length(length, origin, smallest, log),
+        Gap::Length(length, origin) => of_length(length, origin, (smallest, thinnest), log),
         Gap::Broken => None,
     }
 }
@@ -214,7 +214,7 @@ pub(super) fn gap_to_come(
     let smallest = smallest_face_dimension(assembly, &faces, &touching(&interacts, &tied, names.len()));
     match contact.gap {
         Gap::Fit => smallest.map(|face| widest_fit(assembly, &interacts, face)),
-        _ => fixed_gap(contact, smallest, log),
+        _ => fixed_gap(contact, smallest, thinnest(assembly, &interacts), log),
     }
 }
 
@@ -280,10 +280,23 @@ fn of_fraction(fraction: f64, origin: Origin, smallest: Option<f64>, log: &Log<'
 }
 
 /// The same of a gap that is given as a length.
-fn of_length(gap: f64, origin: Origin, smallest: Option<f64>, log: &Log<'_>) -> Option<f64> {
+fn of_length(
+    gap: f64,
+    origin: Origin,
+    (smallest, thinnest): (Option<f64>, Option<f64>),
+    log: &Log<'_>,
+) -> Option<f64> {
     let Some(face) = smallest else { return Some(gap) };
     // A gap of 10 % that was rounded in the deck still counts.
     if gap < 0.1 * face * (1.0 - 1e-9) || gap > 0.5 * face * (1.0 + 1e-9) {
+        // Half their thickness stands for shells, which may be less than any length that is allowed here.
+        let advice = match thinnest.filter(|thickness| 0.5 * thickness < 0.1 * face) {
+            Some(thickness) => format!(
+                "write gap_fraction = \"fit\", which takes half the thickness {} of the thinnest shells",
+                short(thickness)
+            ),
+            None => "choose one between, or write gap_fraction".to_string(),
+        };
         log.fault_of(
             origin,
             format!(
@@ -292,7 +305,7 @@ fn of_length(gap: f64, origin: Origin, smallest: Option<f64>, log: &Log<'_>) -> 
                 short(0.1 * face),
                 short(0.5 * face)
             ),
-            "choose one between, or write gap_fraction",
+            advice,
         );
         return None;
     }

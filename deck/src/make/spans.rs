@@ -257,7 +257,11 @@ fn volumes(parts: &[PartDraft], assembly: &Assembly, log: &Log<'_>) -> bool {
                     part.name,
                     short(volumes[e])
                 ),
-                format!("a {size} above 0"),
+                match volumes[e] > 0.0 && volumes[e].is_finite() {
+                    // One that is only rounding, for the edges of the element.
+                    true => format!("a {size} above {FLAT:e} times the cube of the longest edge"),
+                    false => format!("a {size} above 0"),
+                },
                 advice,
             );
         }

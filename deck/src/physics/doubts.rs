@@ -9,7 +9,7 @@
 
 use std::{collections::BTreeSet, ops::RangeInclusive};
 
-use mechanics::{initial::force_references, material::Strength, wall::Motion};
+use mechanics::{initial::force_references, material::Strength, mesh::Topology, wall::Motion};
 
 use super::{
     Closing, Measured, TRAVEL,
@@ -168,7 +168,18 @@ fn is_driven(model: &Model) -> bool {
             Motion::Free { velocity, .. } => velocity != [0.0; 3],
         })
         || setup.materials.iter().any(|material| material.is_gas())
+        || is_strained(model)
         || !model.spin.is_empty()
+}
+
+/// Whether anything pulls or pushes at the start: stress of the deck, springs with an offset, cables with a tension.
+fn is_strained(model: &Model) -> bool {
+    !model.stress.is_empty()
+        || model.mesh.parts.iter().any(|part| match &part.topology {
+            Topology::Springs { spring, .. } => spring.offset != 0.0,
+            Topology::Trusses { cable: Some(cable), .. } => cable.rest != 1.0,
+            _ => false,
+        })
 }
 
 /// Check 2.

@@ -96,3 +96,29 @@ fn first_steps_are_those_of_runs() {
         assert_eq!(forecast.cycles, Some((forecast.end_time_s / told).ceil() as u64), "{example}");
     }
 }
+
+/// Springs with an offset, cables with a tension and stress at the start move what they hold.
+#[test]
+fn what_is_strained_at_the_start_moves() {
+    let rod = "material = { density = 7850, eos = { type = \"linear\", bulk = 1.6e11 }, strength = { type = \"elastic\", shear = 7.7e10 } }\n";
+    let told = |part: &str, more: &str| {
+        let text = format!(
+            "title = \"s\"\nunits = \"SI\"\n[control]\nend_time = 0.01\n[[part]]\nname = \"s\"\n{part}\
+             mesh = {{ nodes = [[1,0,0,0],[2,0,0,1]], elements = [[1,1,2]] }}\n[[mass]]\nnodes = [2]\nmass = 0.1\n\
+             [[mass]]\nnodes = [1]\nmass = 0.1\n{more}"
+        );
+        let model = deck::read(&text, "s.toml").unwrap_or_else(|faults| panic!("{}\n{text}", faults[0]));
+        forecast(&model).warnings.iter().any(|warning| warning.starts_with("nothing moves"))
+    };
+    let stress = "[[initial_stress]]\nparts = [\"s\"]\nstress = [1e8, 0, 0, 0, 0, 0]\n";
+    for (part, more, is_still) in [
+        ("spring = { stiffness = 1e5 }\n".to_string(), "", true),
+        ("spring = { stiffness = 1e5, offset = 0.01 }\n".to_string(), "", false),
+        (format!("{rod}cable = {{ area = 1e-6 }}\n"), "", true),
+        (format!("{rod}cable = {{ area = 1e-6, tension = 100 }}\n"), "", false),
+        (format!("{rod}truss = {{ area = 1e-4 }}\n"), "", true),
+        (format!("{rod}truss = {{ area = 1e-4 }}\n"), stress, false),
+    ] {
+        assert_eq!(told(&part, more), is_still, "{part}{more}");
+    }
+}
