@@ -5,7 +5,7 @@
 //! A file from outside the folder of the deck is announced by `outside` instead of `file`. Who reads a deck of somebody else may not want
 //! that file shown, so no fault or warning quotes it.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, fs, io::Read, path::Path};
 
 use toml::de::DeTable;
 
@@ -265,6 +265,50 @@ pub fn gather_from(
     Ok(packed)
 }
 
+/// The bytes of a regular file that a deck may be, or refer to: no folder, no device and no pipe, which have no end, and no file that is
+/// larger than all of a deck may be.
+///
+/// # Errors
+/// Why it cannot be read, and what to do.
+pub fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
+    let about = fs::metadata(path).map_err(|e| e.to_string())?;
+    if about.is_dir() {
+        return Err("this is a folder; name a deck in it".to_string());
+    }
+    if !about.is_file() {
+        return Err("this is no regular file; name one, as devices and pipes have no end".to_string());
+    }
+    let too_large =
+        |bytes: u64| format!("{bytes} bytes; a deck has at most {MAX_BYTES} with its includes, shorten it");
+    if about.len() > MAX_BYTES as u64 {
+        return Err(too_large(about.len()));
+    }
+    let mut bytes = Vec::new();
+    // It may grow as it is read.
+    let file = fs::File::open(path).map_err(|e| e.to_string())?;
+    file.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    if bytes.len() > MAX_BYTES { Err(too_large(bytes.len() as u64)) } else { Ok(bytes) }
+}
+
+/// The text of the bytes of a deck. Comments of keyword decks are written in all kinds of encodings, so what is no UTF-8 is replaced there;
+/// in a TOML deck it is an error.
+///
+/// # Errors
+/// The line, and what to do.
+pub fn text_of(bytes: Vec<u8>) -> Result<String, String> {
+    let error = match String::from_utf8(bytes) {
+        Ok(text) => return Ok(text),
+        Err(error) => error,
+    };
+    let (bytes, valid) = (error.as_bytes(), error.utf8_error().valid_up_to());
+    let first = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start().first();
+    if matches!(first, Some(b'*' | b'$')) {
+        return Ok(String::from_utf8_lossy(bytes).into_owned());
+    }
+    let line = 1 + bytes.iter().take(valid).filter(|byte| **byte == b'\n').count();
+    Err(format!("line {line} is no text in UTF-8; save the deck in UTF-8"))
+}
+
 /// `NAME VALUE` of a parameter.
 fn parameter(words: &str) -> Option<(String, f64)> {
     let (name, value) = words.split_once(' ')?;
@@ -293,6 +337,20 @@ fn mesh_files(path: &str, text: &str) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_a_device_and_what_is_no_text_are_no_decks() {
+        let why = |path: &str| bytes_of(Path::new(path)).expect_err("it is no deck");
+        assert!(why(env!("CARGO_MANIFEST_DIR")).contains("this is a folder"));
+        #[cfg(unix)]
+        assert!(why("/dev/zero").contains("no regular file"));
+        assert!(bytes_of(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"))).is_ok());
+        let told = text_of(b"title = \"x\"\n# gr\xfcn\n".to_vec());
+        assert_eq!(told, Err("line 2 is no text in UTF-8; save the deck in UTF-8".to_string()));
+        // It is the first character that tells a keyword deck, not a star somewhere.
+        assert!(text_of(b"# 3 * 4 gr\xfcn\n".to_vec()).is_err());
+        assert_eq!(text_of(b"$ gr\xfcn\n*KEYWORD\n".to_vec()).as_deref(), Ok("$ gr\u{fffd}n\n*KEYWORD\n"));
+    }
 
     #[test]
     fn a_deck_of_one_file_is_its_own_bundle() {
