@@ -18,6 +18,7 @@ mod define;
 mod discrete;
 mod erosion;
 mod explosive;
+mod expression;
 mod fields;
 mod inertia;
 mod joint;
@@ -37,8 +38,8 @@ mod translate;
 mod transmit;
 mod unit;
 
+pub(crate) use expression::evaluate;
 pub(crate) use mesh_alone::read_mesh;
-pub(crate) use parameter::evaluate;
 pub use unit::NAMES as UNIT_NAMES;
 pub(crate) use unit::name_of as units_of;
 

@@ -19,6 +19,13 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
         };
         let g = context.fields(second, block.width, &TENS);
         let form = f.integer(1);
+        if f.real(6, 0.0) != 0.0 {
+            f.fault(
+                6,
+                "no NSM: mass that is not structural",
+                "leave it blank, and put it at nodes by *ELEMENT_MASS",
+            );
+        }
         let section = match form {
             form @ (0 | 1 | 4 | 5 | 9) => of_shape(&f, &g, (form, context), card),
             2 => of_moments(&g).map(Section::Beam),
@@ -39,7 +46,8 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
             6 => Section::Cable(1.0),
             _ => Section::Beam(Shape::Rectangle([1.0; 2]).section(USUAL_POINTS)),
         };
-        problem.sections.insert(f.id(0), (card.at, section.unwrap_or_else(unread)));
+        let id = problem.number("section", &f, context);
+        problem.sections.insert(id, (card.at, section.unwrap_or_else(unread)));
     }
 }
 

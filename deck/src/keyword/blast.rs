@@ -56,7 +56,7 @@ impl Blasts {
             }
             word => {
                 let cards = [block.card(0), block.card(1)];
-                let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+                let [f, g] = [0, 1].map(|i| context.fields(cards[i], block.width, &TENS));
                 self.charge(word == "LOAD_BLAST_ENHANCED", &f, &g);
             }
         }

@@ -4,9 +4,10 @@
 //! behind a keyword, `*END` in the middle of a file, options of a keyword such as `LONG=Y` and `CID=1`.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::parameter;
+use super::parameter::Parameters;
 use crate::{
     bundle::Bundle,
     include::{beside, candidates, lines, path_of},
@@ -40,6 +41,23 @@ pub(super) struct Card<'a> {
     pub(super) at: Place,
     /// Without its line end and trailing blanks.
     pub(super) text: Cow<'a, str>,
+    /// Whether somebody took anything from it.
+    is_read: Cell<bool>,
+}
+
+impl<'a> Card<'a> {
+    pub(super) fn new(at: Place, text: Cow<'a, str>) -> Self {
+        Self { at, text, is_read: Cell::new(false) }
+    }
+
+    pub(super) fn is_blank(&self) -> bool {
+        self.text.trim().is_empty()
+    }
+
+    /// Notes that the card was read, or that it may be left.
+    pub(super) fn mark(&self) {
+        self.is_read.set(true);
+    }
 }
 
 /// A keyword with its cards.
@@ -50,9 +68,27 @@ pub(super) struct Block<'a> {
     pub(super) keyword: String,
     pub(super) width: Width,
     pub(super) cards: Vec<Card<'a>>,
+    /// Whether each set of cards has a heading of its own before it, which its reader passes over.
+    pub(super) is_headed: bool,
+    /// Index among all blocks of the deck, by which parameters have their values.
+    pub(super) order: usize,
+    /// What stands behind the last card.
+    end: Card<'a>,
 }
 
-impl Block<'_> {
+impl<'a> Block<'a> {
+    fn new(at: Place, keyword: String, width: Width) -> Self {
+        Self {
+            at,
+            keyword,
+            width,
+            cards: Vec::new(),
+            is_headed: false,
+            order: 0,
+            end: Card::new(at, Cow::Borrowed("")),
+        }
+    }
+
     /// Takes `suffix` off the keyword; whether it was there.
     pub(super) fn take(&mut self, suffix: &str) -> bool {
         let stem = self.keyword.strip_suffix(suffix).map(str::len);
@@ -63,19 +99,56 @@ impl Block<'_> {
     }
 
     /// The card of that index; a blank one past the end, as LS-DYNA reads defaults there.
-    pub(super) fn card(&self, index: usize) -> Card<'_> {
-        self.cards.get(index).cloned().unwrap_or(Card {
-            at: self.cards.last().map_or(self.at, |card| card.at),
-            text: Cow::Borrowed(""),
-        })
+    pub(super) fn card(&self, index: usize) -> &Card<'a> {
+        self.cards.get(index).unwrap_or(&self.end)
+    }
+
+    /// Drops the blank cards at the end.
+    pub(super) fn trim(&mut self) {
+        while self.cards.last().is_some_and(Card::is_blank) {
+            self.cards.pop();
+        }
+        self.end.at = self.cards.last().map_or(self.at, |card| card.at);
+    }
+
+    /// Leaves the first `n` cards: those that were not read change nothing here.
+    pub(super) fn leave(&self, n: usize) {
+        self.cards.iter().take(n).for_each(Card::mark);
+    }
+
+    /// Leaves all cards.
+    pub(super) fn leave_all(&self) {
+        self.leave(self.cards.len());
+    }
+
+    /// A keyword that changes nothing here: its cards are left.
+    pub(super) fn ignore(&self, log: &Log<'_>) {
+        self.leave_all();
+        log.ignore(self.at, &self.keyword);
+    }
+
+    /// Reports the first card that nobody read and nobody left, so that no keyword drops cards in silence.
+    pub(super) fn check_all_is_read(&self, log: &Log<'_>) {
+        // Cards of zeros say as little as blank ones.
+        let says = |card: &Card<'_>| card.text.contains(|c: char| !matches!(c, ' ' | ',' | '0' | '.'));
+        let unread = |card: &&Card<'_>| !card.is_read.get() && says(card);
+        let Some(card) = self.cards.iter().find(unread) else { return };
+        log.fault(
+            card.at,
+            log.quote(&card.text),
+            format!(
+                "no further card of *{}: this one and those below it are not read",
+                log.quote(&self.keyword)
+            ),
+            "write the keyword again before each set of cards, or take the card out",
+        );
     }
 }
 
 /// What the lines of a deck hold.
 pub(super) struct Lines<'a> {
     pub(super) blocks: Vec<Block<'a>>,
-    /// Values of the parameters by lower-case name.
-    pub(super) parameters: BTreeMap<String, f64>,
+    pub(super) parameters: Parameters,
 }
 
 /// A walk through the files of a bundle.
@@ -84,7 +157,7 @@ struct Walk<'b, 'a> {
     log: &'b Log<'b>,
     folders: Vec<String>,
     blocks: Vec<Block<'a>>,
-    parameters: BTreeMap<String, f64>,
+    parameters: Parameters,
     /// Parameters from outside that the deck has not defined yet.
     given: BTreeSet<&'b str>,
     n_lines: usize,
@@ -109,7 +182,7 @@ pub(super) fn read<'a>(bundle: &Bundle<'a>, log: &Log<'_>) -> Lines<'a> {
         log,
         folders: Vec::new(),
         blocks: Vec::new(),
-        parameters: BTreeMap::new(),
+        parameters: Parameters::default(),
         given: bundle.options.parameters.keys().map(String::as_str).collect(),
         n_lines: 0,
         most_lines: MAX_LINES
@@ -136,7 +209,14 @@ pub(super) fn read<'a>(bundle: &Bundle<'a>, log: &Log<'_>) -> Lines<'a> {
 }
 
 impl<'a> Walk<'_, 'a> {
+    /// A file; the parameters that are its own end with it.
     fn file(&mut self, file: usize, depth: usize) {
+        self.parameters.enter();
+        self.lines_of(file, depth);
+        self.parameters.leave(self.blocks.len());
+    }
+
+    fn lines_of(&mut self, file: usize, depth: usize) {
         let text = self.bundle.files[file].1;
         let mut width = Width::Standard;
         let mut block: Option<Block<'a>> = None;
@@ -158,7 +238,7 @@ impl<'a> Walk<'_, 'a> {
             }
             let Some(keyword) = words.strip_prefix('*') else {
                 if let Some(block) = &mut block {
-                    block.cards.push(Card { at, text: plain(words) });
+                    block.cards.push(Card::new(at, plain(words)));
                 } else if !words.trim().is_empty() {
                     let quote = words.trim();
                     self.log.fault(at, self.log.quote(quote), "a keyword first", "put it under a *KEYWORD");
@@ -192,7 +272,15 @@ impl<'a> Walk<'_, 'a> {
         if keyword == "KEYWORD" {
             for option in &options {
                 match option.split_once('=') {
-                    Some(("LONG", value)) if value != "N" => *file_width = Width::Long,
+                    // Of the two letters that say how another program writes what it read, S reads standard fields and K long ones.
+                    Some(("LONG", "Y" | "K")) => *file_width = Width::Long,
+                    Some(("LONG", "N" | "S")) => {}
+                    Some(("LONG", value)) => self.log.fault(
+                        at,
+                        format!("LONG={}", self.log.quote(value)),
+                        "LONG=Y, K, S or N",
+                        "write LONG=Y where all fields have 20 columns, else leave it out",
+                    ),
                     Some(("I10", "Y")) => *file_width = Width::I10,
                     _ => {}
                 }
@@ -213,7 +301,7 @@ impl<'a> Walk<'_, 'a> {
                     "write for instance *CASE_BEGIN_1",
                 ),
             }
-            return Some(Block { at, keyword: "COMMENT".to_string(), width, cards: Vec::new() });
+            return Some(Block::new(at, "COMMENT".to_string(), width));
         }
         let chosen = options
             .iter()
@@ -224,7 +312,7 @@ impl<'a> Walk<'_, 'a> {
             // Its cards are read and dropped.
             keyword = "COMMENT".to_string();
         }
-        Some(Block { at, keyword, width, cards: Vec::new() })
+        Some(Block::new(at, keyword, width))
     }
 
     /// Whether a command identifier belongs to the case that was chosen.
@@ -234,7 +322,7 @@ impl<'a> Walk<'_, 'a> {
     }
 
     fn close(&mut self, block: Option<Block<'a>>, depth: usize) {
-        let Some(block) = block else { return };
+        let Some(mut block) = block else { return };
         match block.keyword.as_str() {
             "COMMENT" => {}
             "CASE" => self.case(&block),
@@ -249,11 +337,19 @@ impl<'a> Walk<'_, 'a> {
                     }
                 }
             }
-            "PARAMETER" | "PARAMETER_LOCAL" | "PARAMETER_EXPRESSION" | "PARAMETER_EXPRESSION_LOCAL" => {
-                parameter::read(&block, &mut self.parameters, &self.bundle.options.parameters, self.log);
-                self.given.retain(|name| !self.parameters.contains_key(*name));
+            "PARAMETER"
+            | "PARAMETER_LOCAL"
+            | "PARAMETER_EXPRESSION"
+            | "PARAMETER_EXPRESSION_LOCAL"
+            | "PARAMETER_DUPLICATION" => {
+                let next = self.blocks.len();
+                self.parameters.read(&block, next, &self.bundle.options.parameters, self.log);
+                self.given.retain(|name| !self.parameters.is_defined(name));
             }
-            _ => self.blocks.push(block),
+            _ => {
+                block.order = self.blocks.len();
+                self.blocks.push(block);
+            }
         }
     }
 

@@ -228,7 +228,7 @@ pub(super) fn motions<'c>(
 /// The next card that is not blank; where each has a card with a number and a heading before it, the one behind that.
 fn next_card<'c, 'd>(cards: &mut std::slice::Iter<'c, Card<'d>>, named: bool) -> Option<&'c Card<'d>> {
     if named {
-        cards.next()?;
+        cards.next()?.mark();
     }
     cards.find(|card| !card.text.trim().is_empty())
 }
@@ -333,7 +333,7 @@ impl Conditions {
     ) {
         let named = block.take("_ID");
         let dated = block.take("_BIRTH_DEATH");
-        let per_card = block.keyword.starts_with("BOUNDARY") || block.keyword.starts_with("LOAD");
+        let per_card = ["BOUNDARY", "LOAD", "RIGIDWALL"].iter().any(|kind| block.keyword.starts_with(kind));
         if named && !per_card && !block.cards.is_empty() {
             block.cards.remove(0);
         }
@@ -341,7 +341,16 @@ impl Conditions {
         match word.as_str() {
             "INITIAL_VELOCITY" => self.velocity(block, context),
             "INITIAL_VELOCITY_GENERATION" => self.generation(block, context),
-            word if word.starts_with("RIGIDWALL") => self.wall(block, context),
+            word if word.starts_with("RIGIDWALL") => {
+                let forces = word.ends_with("_FORCES");
+                let each = [named, true, true, word.contains("_MOVING"), forces];
+                let each = each.into_iter().filter(|is| *is).count();
+                for first in (0..block.cards.len().max(1)).step_by(each) {
+                    // What stands on the last card of _FORCES is how its forces are written.
+                    block.leave(if forces { first + each } else { first + usize::from(named) });
+                    self.wall(block, first + usize::from(named), context);
+                }
+            }
             word if word.starts_with("BOUNDARY_PRESCRIBED") => {
                 let of_set = word.ends_with("_SET");
                 motions(block, named, vectors, context, |f, way, how| {
@@ -462,7 +471,7 @@ impl Conditions {
     /// `*INITIAL_VELOCITY`: a set, and perhaps another for those it leaves out.
     fn velocity(&mut self, block: &Block<'_>, context: &Context<'_>) {
         let cards = [block.card(0), block.card(1), block.card(2)];
-        let [f, g, h] = [0, 1, 2].map(|i| context.fields(&cards[i], block.width, &TENS));
+        let [f, g, h] = [0, 1, 2].map(|i| context.fields(cards[i], block.width, &TENS));
         let base = |target, except, inside, velocity, own_turn| Velocity {
             at: f.at,
             target,
@@ -486,7 +495,7 @@ impl Conditions {
         let n = block.cards.len().div_ceil(2);
         for i in 0..n {
             let cards = [block.card(2 * i), block.card(2 * i + 1)];
-            let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+            let [f, g] = [0, 1].map(|i| context.fields(cards[i], block.width, &TENS));
             let id = f.id(0);
             let target = match f.integer(1) {
                 _ if id == 0 => Target::All,
@@ -527,11 +536,10 @@ impl Conditions {
         }
     }
 
-    /// `*RIGIDWALL_PLANAR`.
-    fn wall(&mut self, block: &Block<'_>, context: &Context<'_>) {
+    /// A wall of `*RIGIDWALL_PLANAR`, whose cards begin with `first`.
+    fn wall(&mut self, block: &Block<'_>, first: usize, context: &Context<'_>) {
         let moving = block.keyword.contains("_MOVING");
-        let cards = [block.card(0), block.card(1), block.card(2)];
-        let [f, g, h] = [0, 1, 2].map(|i| context.fields(&cards[i], block.width, &TENS));
+        let [f, g, h] = [0, 1, 2].map(|i| context.fields(block.card(first + i), block.width, &TENS));
         all_along(&f, 4, 5);
         let point = g.vector(0);
         let head = g.vector(3);

@@ -9,6 +9,9 @@ use super::{
 };
 use crate::{place::Place, table::Range};
 
+/// Most cards of a contact: its number and those of `_MPP`, three that each has, one of its kind, seven that are optional.
+const MOST_CARDS: usize = 3 + 3 + 1 + 7;
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Side {
     /// Every part.
@@ -71,6 +74,8 @@ impl ContactCard {
     pub(super) fn read(block: &mut Block<'_>, context: &Context<'_>) -> Option<Self> {
         let log = context.log;
         let whole = block.keyword.clone();
+        // Numbers, the three cards, one of its kind, and those that are optional.
+        block.leave(MOST_CARDS);
         if whole == "CONTACT_INTERIOR" || whole.starts_with("CONTACT_INTERIOR_") {
             log.warn(
                 block.at,
@@ -82,6 +87,8 @@ impl ContactCard {
         let mut extra = usize::from(block.take("_ID") || block.take("_TITLE"));
         extra += usize::from(block.take("_MPP"));
         extra += usize::from(extra == 0 && (block.take("_ID") || block.take("_TITLE")));
+        // The second card of _MPP is there where it begins so.
+        extra += usize::from(extra > 0 && block.card(extra).text.starts_with('&'));
         if block.take("_MORTAR") {
             log.warn(block.at, format!("*{}: our own penalty, on nodes and faces", log.quote(&whole)));
         }
@@ -124,16 +131,20 @@ impl ContactCard {
         if erodes {
             // The card of an eroding contact is its fourth.
             let card = block.card(extra + 3);
-            erodes = context.fields(&card, block.width, &TENS).integer(1) != 0;
+            erodes = context.fields(card, block.width, &TENS).integer(1) != 0;
         }
-        let cards = [block.card(extra), block.card(extra + 1)];
-        let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+        let [f, g, h] = [0, 1, 2].map(|i| context.fields(block.card(extra + i), block.width, &TENS));
         for i in [4, 5].into_iter().filter(|i| f.integer(*i) != 0) {
             f.fault(i, "contact wherever its parts are", "leave the boxes blank");
         }
         all_along(&g, 6, 7);
         let side = |i: usize| Side::read(&f, i, single);
-        let (fixed, moving, decay) = (g.real(0, 0.0), g.real(1, 0.0), g.real(2, 0.0));
+        // FSF scales friction.
+        let factor = match h.within(6, 1.0, Range::NotNegative) {
+            0.0 => 1.0,
+            factor => factor,
+        };
+        let (fixed, moving, decay) = (factor * g.real(0, 0.0), factor * g.real(1, 0.0), g.real(2, 0.0));
         if fixed < 0.0 || (decay != 0.0 && moving < 0.0) {
             g.fault(
                 if fixed < 0.0 { 0 } else { 1 },
@@ -150,7 +161,7 @@ impl ContactCard {
         let tied = if word.contains("TIEBREAK") {
             // The card of a tiebreak is its fourth.
             let card = block.card(extra + 3);
-            Some(Tied::read(&context.fields(&card, block.width, &TENS), &word)?)
+            Some(Tied::read(&context.fields(card, block.width, &TENS), &word)?)
         } else {
             word.starts_with("TIED").then(Tied::default)
         };
@@ -160,8 +171,9 @@ impl ContactCard {
     /// Reads `*CONTACT_FORCE_TRANSDUCER_`; none where its surfaces are of a kind that is not known.
     pub(super) fn read_transducer(block: &mut Block<'_>, context: &Context<'_>) -> Option<Self> {
         let extra = usize::from(block.take("_ID") || block.take("_TITLE"));
+        block.leave(MOST_CARDS);
         let card = block.card(extra);
-        let f = context.fields(&card, block.width, &TENS);
+        let f = context.fields(card, block.width, &TENS);
         if [4, 5].iter().any(|i| f.integer(*i) != 0) {
             context.log.warn(f.at, "a force transducer with boxes: the forces are those of its whole parts");
         }

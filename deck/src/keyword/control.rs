@@ -4,7 +4,10 @@ use super::{
     cards::Block,
     fields::{Context, TENS},
 };
-use crate::{geometry, place::Place};
+use crate::{
+    geometry,
+    place::{Place, Placed},
+};
 
 /// Keywords that say how a computation is carried out or written, not what is computed here.
 const HARMLESS: [&str; 15] = [
@@ -53,14 +56,15 @@ pub(super) enum CutCard {
 }
 
 impl SectionCard {
-    fn read(block: &Block<'_>, context: &Context<'_>) -> Option<Self> {
+    /// Reads the set of cards that begins with card `first`.
+    fn read(block: &Block<'_>, first: usize, context: &Context<'_>) -> Option<Self> {
         let named = usize::from(block.keyword.ends_with("_ID"));
-        let name = block.card(0);
-        let title = context.fields(&name, block.width, &[10, 70]);
+        let name = block.card(first);
+        let title = context.fields(name, block.width, &[10, 70]);
         let (id, heading) =
             if named == 1 { (title.id(0), title.words(1).to_string()) } else { (0, String::new()) };
-        let cards = [block.card(named), block.card(named + 1)];
-        let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+        let cards = [block.card(first + named), block.card(first + named + 1)];
+        let [f, g] = cards.map(|card| context.fields(card, block.width, &TENS));
         if block.keyword.starts_with("DATABASE_CROSS_SECTION_SET") {
             for (field, what) in [(4, "thick shells"), (5, "discrete elements")] {
                 if f.id(field) != 0 {
@@ -128,6 +132,8 @@ pub(super) struct ControlCards {
     pub(super) freed_nodes: Option<(Place, bool)>,
     /// Whether the thickness of shells follows their strains.
     pub(super) shells_thin: bool,
+    /// THEORY of `*CONTROL_SHELL`: ELFORM of sections that leave it blank.
+    pub(super) theory: Option<Placed<i64>>,
     pub(super) period: Option<(Place, f64)>,
     pub(super) sections: Vec<SectionCard>,
     /// Nodes and sets of nodes whose motion is to be written.
@@ -142,8 +148,10 @@ impl ControlCards {
     /// Reads a `*CONTROL_` keyword.
     pub(super) fn read(&mut self, block: &Block<'_>, context: &Context<'_>) {
         let log = context.log;
+        // One set each; further cards say how a computation is carried out.
+        block.leave_all();
         let card = block.card(0);
-        let f = context.fields(&card, block.width, &TENS);
+        let f = context.fields(card, block.width, &TENS);
         match block.keyword.as_str() {
             "CONTROL_TERMINATION" => {
                 let end = f.real(0, 0.0);
@@ -163,8 +171,8 @@ impl ControlCards {
             }
             "CONTROL_TIMESTEP" => {
                 let factor = f.real(1, 0.9);
-                if factor < 0.0 {
-                    f.fault(1, "a factor above 0", "leave TSSFAC blank");
+                if !(0.0..=1.0).contains(&factor) {
+                    f.fault(1, "a factor above 0 and at most 1", "leave TSSFAC blank for 0.9");
                 } else if factor > 0.0 {
                     self.step_factor = Some((card.at, factor));
                 }
@@ -186,6 +194,11 @@ impl ControlCards {
             }
             "CONTROL_BULK_VISCOSITY" => {
                 let [quadratic, linear] = [f.real(0, 1.5), f.real(1, 0.06)];
+                let kind = f.integer(2);
+                if !matches!(kind, 0 | 1) {
+                    let words = format!("TYPE {kind}: bulk viscosity is that of solids, as with TYPE 1");
+                    log.warn(card.at, words);
+                }
                 if quadratic < 0.0 || linear < 0.0 {
                     f.fault(0, "coefficients of 0 or above", "correct Q1 and Q2");
                 } else {
@@ -203,7 +216,7 @@ impl ControlCards {
                         "leave it blank, or say 1 to keep the mass of freed nodes",
                     ),
                 }
-                log.ignore(block.at, "CONTROL_CONTACT");
+                block.ignore(log);
             }
             // The energies that it switches on are always reckoned.
             "CONTROL_ENERGY" => {}
@@ -226,6 +239,7 @@ impl ControlCards {
                 "take the keyword out if the problem does without it",
             ),
             "CONTROL_SHELL" => {
+                self.theory = Some(f.placed(4, "THEORY", f.integer(4)));
                 let update = f.integer(3);
                 // 2 is of thick shells alone.
                 self.shells_thin = !matches!(update, 0 | 2);
@@ -245,7 +259,7 @@ impl ControlCards {
                 || word.starts_with("CONTROL_MPP_")
                 || word.starts_with("CONTROL_CHECK") =>
             {
-                log.ignore(block.at, word);
+                block.ignore(log);
             }
             word => log.fault(
                 block.at,
@@ -260,8 +274,9 @@ impl ControlCards {
     pub(super) fn read_database(&mut self, block: &Block<'_>, context: &Context<'_>) {
         match block.keyword.as_str() {
             "DATABASE_BINARY_D3PLOT" => {
+                block.leave_all();
                 let card = block.card(0);
-                let period = context.fields(&card, block.width, &TENS).real(0, 0.0);
+                let period = context.fields(card, block.width, &TENS).real(0, 0.0);
                 if period > 0.0 {
                     self.period = Some((card.at, period));
                 }
@@ -280,13 +295,20 @@ impl ControlCards {
             | "DATABASE_CROSS_SECTION_PLANE_ID"
             | "DATABASE_CROSS_SECTION_SET"
             | "DATABASE_CROSS_SECTION_SET_ID" => {
-                self.sections.extend(SectionCard::read(block, context));
+                let named = usize::from(block.keyword.ends_with("_ID"));
+                let each = named + if block.keyword.contains("_PLANE") { 2 } else { 1 };
+                for first in (0..block.cards.len()).step_by(each) {
+                    self.sections.extend(SectionCard::read(block, first, context));
+                }
             }
-            word if word.starts_with("DATABASE_CROSS_SECTION") => context.log.warn(
-                block.at,
-                format!("*{word}: the force of this section is not written; that of _PLANE or _SET is"),
-            ),
-            word => context.log.ignore(block.at, word),
+            word if word.starts_with("DATABASE_CROSS_SECTION") => {
+                block.leave_all();
+                context.log.warn(
+                    block.at,
+                    format!("*{word}: the force of this section is not written; that of _PLANE or _SET is"),
+                );
+            }
+            _ => block.ignore(context.log),
         }
     }
 }

@@ -9,7 +9,7 @@ use super::{
 /// Reads the rate, which all directions and turns have alike.
 pub(super) fn read(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     let card = block.card(0);
-    let f = context.fields(&card, block.width, &TENS);
+    let f = context.fields(card, block.width, &TENS);
     if f.id(0) != 0 {
         f.fault(0, "no curve: damping is constant", "leave LCID blank and give VALDMP");
     }

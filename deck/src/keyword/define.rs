@@ -10,7 +10,7 @@ use crate::geometry::{cross, sub as minus, unit};
 /// `*DEFINE_CURVE`.
 pub(super) fn read_curve(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     let head = block.card(0);
-    let f = context.fields(&head, block.width, &TENS);
+    let f = context.fields(head, block.width, &TENS);
     // Of those that nothing in the run itself takes it does no harm.
     let relaxation = (f.integer(1) == 1).then(|| f.origin(1, "SIDR"));
     let or_one = |x: f64| if x == 0.0 { 1.0 } else { x };
@@ -30,17 +30,24 @@ pub(super) fn read_curve(problem: &mut Problem, block: &Block<'_>, context: &Con
         f.fault(0, "a curve with points", "give it at least one");
         points.push([0.0; 2]);
     }
-    problem.curves.insert(f.id(0), CurveCard { points, relaxation });
+    let id = problem.number("curve", &f, context);
+    problem.curves.insert(id, CurveCard { points, relaxation });
 }
 
-/// The three directions of a system: x from the origin, the xy plane through a third point.
-pub(super) fn read_system(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
-    let head = block.card(0);
-    let f = context.fields(&head, block.width, &TENS);
+/// `*DEFINE_COORDINATE_`: a set of cards for each system.
+pub(super) fn read_systems(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
+    let each = if block.keyword == "DEFINE_COORDINATE_SYSTEM" { 2 } else { 1 };
+    for first in (0..block.cards.len().max(1)).step_by(each) {
+        read_system(problem, block, first, context);
+    }
+}
+
+/// The three directions of the system whose cards begin with `first`: x from the origin, the xy plane through a third point.
+fn read_system(problem: &mut Problem, block: &Block<'_>, first: usize, context: &Context<'_>) {
+    let f = context.fields(block.card(first), block.width, &TENS);
     let (x, plane) = match block.keyword.as_str() {
         "DEFINE_COORDINATE_SYSTEM" => {
-            let second = block.card(1);
-            let g = context.fields(&second, block.width, &TENS);
+            let g = context.fields(block.card(first + 1), block.width, &TENS);
             if f.integer(7) != 0 {
                 f.fault(7, "no system inside a system", "give points in global coordinates");
             }
@@ -56,6 +63,10 @@ pub(super) fn read_system(problem: &mut Problem, block: &Block<'_>, context: &Co
                 }
                 node.unwrap_or_default()
             });
+            if !matches!(f.words(5).to_ascii_uppercase().as_str(), "" | "0" | "X") {
+                let expected = "DIR X: the second node lies on the axis x, the third in the plane of x and y";
+                f.fault(5, expected, "leave it blank, and name the nodes in that order");
+            }
             if f.integer(4) != 0 {
                 f.fault(4, "a system that stands", "leave FLAG at 0");
             }
@@ -66,7 +77,8 @@ pub(super) fn read_system(problem: &mut Problem, block: &Block<'_>, context: &Co
     let directions = [x, cross(z, x), z].map(unit);
     match directions {
         [Some(x), Some(y), Some(z)] => {
-            problem.systems.insert(f.id(0), [x, y, z]);
+            let id = problem.number("coordinate system", &f, context);
+            problem.systems.insert(id, [x, y, z]);
         }
         _ => f.fault(0, "three points that are not on a line", "move one"),
     }
@@ -83,7 +95,8 @@ pub(super) fn read_vectors(problem: &mut Problem, block: &Block<'_>, context: &C
         }
         match unit(minus(f.vector(4), f.vector(1))) {
             Some(direction) => {
-                problem.vectors.insert(f.id(0), direction);
+                let id = problem.number("vector", &f, context);
+                problem.vectors.insert(id, direction);
             }
             None => f.fault(4, "a head apart from the tail", "give XH, YH, ZH"),
         }
@@ -95,7 +108,8 @@ pub(super) fn read_box(problem: &mut Problem, block: &Block<'_>, context: &Conte
     for card in &block.cards {
         let f = context.fields(card, block.width, &TENS);
         let bounds = [0, 1].map(|end| [1, 3, 5].map(|i| f.real(i + end, 0.0)));
-        problem.boxes.insert(f.id(0), bounds);
+        let id = problem.number("box", &f, context);
+        problem.boxes.insert(id, bounds);
     }
 }
 
@@ -130,9 +144,9 @@ pub(super) fn read_other(problem: &mut Problem, block: &Block<'_>, context: &Con
     if ["DEFINE_CURVE", "DEFINE_TABLE", "DEFINE_FUNCTION"].iter().any(|kind| word.starts_with(kind)) {
         let head = block.card(0);
         // Only to tell what a number is that was taken for a curve's.
-        if let Ok(id) = context.fields(&head, block.width, &TENS).words(0).parse() {
+        if let Ok(id) = context.fields(head, block.width, &TENS).words(0).parse() {
             problem.other_curves.insert(id, (head.at, word.to_string()));
         }
     }
-    context.log.ignore(block.at, word);
+    block.ignore(context.log);
 }

@@ -105,7 +105,8 @@ pub(super) fn read_sections(problem: &mut Problem, block: &Block<'_>, context: &
                 refuse(&g, i, &format!("{name} 0: elongations have no limit"), "leave it blank");
             }
         }
-        problem.sections.insert(f.id(0), (card.at, Section::Discrete));
+        let id = problem.number("section", &f, context);
+        problem.sections.insert(id, (card.at, Section::Discrete));
     }
 }
 
@@ -125,7 +126,7 @@ pub(super) fn read_material(block: &Block<'_>, context: &Context<'_>) -> Option<
     let word = NAMES.iter().find(|(number, _)| *number == block.keyword);
     let word = word.map_or(block.keyword.as_str(), |(_, name)| name);
     let card = block.card(0);
-    let f = context.fields(&card, block.width, &TENS);
+    let f = context.fields(card, block.width, &TENS);
     let curve = |i: usize, name: &'static str| {
         let curve = f.reference(i, name);
         if curve.value == 0 {

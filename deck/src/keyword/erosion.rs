@@ -159,9 +159,9 @@ const FIELDS: [LimitField; 9] = [
 
 /// Reads `*MAT_ADD_EROSION`: the number of its material, and its limits. Every criterion that is not one of ours is a fault at
 /// its field.
-pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
+pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (Placed<u32>, Limits) {
     let cards: [_; 6] = std::array::from_fn(|i| block.card(i));
-    let f: [_; 6] = std::array::from_fn(|i| context.fields(&cards[i], block.width, &TENS));
+    let f: [_; 6] = std::array::from_fn(|i| context.fields(cards[i], block.width, &TENS));
     let (mut limits, faults) = (Limits::default(), context.log.count());
     // A criterion is off where its field holds EXCL, and where it holds 0.
     let excluded = f[0].real(1, 0.0);
@@ -222,5 +222,5 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (u32, Limits) {
     if context.log.count() == faults && limits.erosion().is_none() {
         context.log.warn(block.at, "*MAT_ADD_EROSION without a criterion: nothing leaves by it");
     }
-    (f[0].id(0), limits)
+    (f[0].reference(0, "MID"), limits)
 }

@@ -1,10 +1,9 @@
 //! Fields of a card: fixed columns, or separated by commas; numbers, parameters, numbers of things.
 
-use std::collections::BTreeMap;
-
 use super::{
-    cards::{Card, Width},
-    parameter,
+    cards::{Block, Card, Width},
+    expression::{Error, evaluate_keyword, real},
+    parameter::Parameters,
 };
 use crate::{
     log::Log,
@@ -23,7 +22,9 @@ pub(super) const EIGHTS: [usize; 10] = [8; 10];
 #[derive(Clone, Copy)]
 pub(super) struct Context<'d> {
     pub(super) log: &'d Log<'d>,
-    pub(super) parameters: &'d BTreeMap<String, f64>,
+    pub(super) parameters: &'d Parameters,
+    /// The block whose cards are read.
+    pub(super) block: usize,
 }
 
 /// The fields of one card.
@@ -32,12 +33,18 @@ pub(super) struct Fields<'c> {
     /// Column from 1 and words of each field.
     cells: [(u32, &'c str); MAX_FIELDS],
     n: usize,
+    card: &'c Card<'c>,
     context: Context<'c>,
 }
 
 impl<'d> Context<'d> {
+    /// The same for another block.
+    pub(super) fn of(self, block: &Block<'_>) -> Self {
+        Self { block: block.order, ..self }
+    }
+
     /// Cuts a card into fields of the standard `widths`.
-    pub(super) fn fields<'c>(&self, card: &'c Card<'_>, width: Width, widths: &[usize]) -> Fields<'c>
+    pub(super) fn fields<'c>(&self, card: &'c Card<'c>, width: Width, widths: &[usize]) -> Fields<'c>
     where
         'd: 'c,
     {
@@ -66,12 +73,14 @@ impl<'d> Context<'d> {
                 n += 1;
             }
         }
-        Fields { at: card.at, cells, n, context: *self }
+        Fields { at: card.at, cells, n, card, context: *self }
     }
 }
 
 impl<'c> Fields<'c> {
+    /// The words of a field; whoever asks for those of any has read the card.
     pub(super) fn words(&self, i: usize) -> &'c str {
+        self.card.mark();
         if i < self.n { self.cells[i].1 } else { "" }
     }
 
@@ -134,17 +143,18 @@ impl<'c> Fields<'c> {
             return None;
         }
         let value = if words.contains('&') {
-            match parameter::evaluate(words, self.context.parameters) {
-                Ok(value) => Some(value),
+            let Context { parameters, block, .. } = self.context;
+            match evaluate_keyword(words, &|name| parameters.value_in(name, block)) {
+                Ok(number) => Some(number.value),
                 // The deck is refused already; this value is only there to make no further faults.
-                Err(parameter::Error::Broken(_)) => return Some(1.0),
+                Err(Error::Broken(_)) => return Some(1.0),
                 Err(why) => {
                     self.fault(i, "a parameter that is defined", why.to_string());
                     return None;
                 }
             }
         } else {
-            parameter::real(words)
+            real(words)
         };
         let value = value.filter(|x| holds(*x));
         if value.is_none() {
@@ -208,9 +218,9 @@ mod tests {
 
     fn with(text: &str, width: Width, widths: &[usize], check: impl Fn(&Fields<'_>)) -> Vec<String> {
         let log = Log::keyword(&[("a.k", "")]);
-        let parameters = BTreeMap::from([("v".to_string(), 2.5)]);
-        let card = Card { at: Place::card(0, 3), text: Cow::Borrowed(text) };
-        check(&Context { log: &log, parameters: &parameters }.fields(&card, width, widths));
+        let parameters = Parameters::of(&[("v", 2.5)]);
+        let card = Card::new(Place::card(0, 3), Cow::Borrowed(text));
+        check(&Context { log: &log, parameters: &parameters, block: 0 }.fields(&card, width, widths));
         log.into_lists().0.iter().map(ToString::to_string).collect()
     }
 

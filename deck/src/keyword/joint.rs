@@ -3,7 +3,7 @@
 use mechanics::joint::Kind;
 
 use super::{
-    cards::Block,
+    cards::{Block, Card},
     fields::{Context, TENS},
 };
 use crate::place::Place;
@@ -73,7 +73,7 @@ pub(super) fn read(joints: &mut Vec<JointCard>, block: &Block<'_>, context: &Con
         let f = context.fields(card, block.width, &TENS);
         if local {
             // Where forces are written in axes of its own, which are in those of space here.
-            cards.next();
+            cards.next().into_iter().for_each(Card::mark);
         }
         let nodes = [0, 1, 2, 3, 4, 5].map(|i| f.id(i));
         match nodes[..n_nodes].iter().position(|node| *node == 0) {

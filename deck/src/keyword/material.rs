@@ -18,6 +18,7 @@ use super::{
     fields::{Context, Fields, TENS},
 };
 use crate::{
+    log::Log,
     place::{Origin, Place, Placed},
     table::Range,
 };
@@ -160,7 +161,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
     let word =
         NUMBERS.iter().find(|(number, _)| *number == block.keyword).map_or(block.keyword.as_str(), |n| n.1);
     let cards: [_; 8] = std::array::from_fn(|i| block.card(i));
-    let f: [_; 8] = std::array::from_fn(|i| context.fields(&cards[i], block.width, &TENS));
+    let f: [_; 8] = std::array::from_fn(|i| context.fields(cards[i], block.width, &TENS));
     let density = f[0].positive(1, "a density");
     let mut limits = Limits::default();
     let moduli = |i: usize| {
@@ -263,7 +264,7 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
             (elastic, law)
         }
         "MAT_JOHNSON_COOK" => {
-            let law = johnson_cook(&f, &mut needs_moduli);
+            let law = johnson_cook(&f, &mut needs_moduli, log);
             // EROD other than 0 keeps broken elements in the mesh, without shear stress.
             if matches!(&law, Some(Law::JohnsonCook { damage: Some(_), .. })) && f[3].integer(2) == 0 {
                 limits.by_failure(f[2].origin(4, "D1"));
@@ -385,14 +386,26 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
             return None;
         }
     };
+    // Cards that belong to a law and that it may do without.
+    block.leave(match word {
+        "MAT_RIGID" => 3,
+        "MAT_MODIFIED_ZERILLI_ARMSTRONG" => 4,
+        "MAT_COMPOSITE_DAMAGE" | "MAT_HONEYCOMB" => 5,
+        "MAT_SOIL_AND_FOAM" => 6,
+        "MAT_ENHANCED_COMPOSITE_DAMAGE" => 8,
+        _ => 1,
+    });
     if elastic.is_none() && needs_moduli {
         return None;
     }
     Some(MaterialCard { at: cards[0].at, density: density?, elastic, law: law?, erosion: limits, fibres })
 }
 
+/// A least strain at fracture that bounds none: LS-DYNA's own is 1e-6.
+const LEAST_FRACTURE_STRAIN: f64 = 1e-5;
+
 /// Five cards of `*MAT_JOHNSON_COOK`.
-fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool) -> Option<Law> {
+fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool, log: &Log<'_>) -> Option<Law> {
     *needs_moduli = false;
     let g = f[0].real(2, 0.0);
     let (young, poisson) = (f[0].real(3, 0.0), f[0].real(4, 0.0));
@@ -404,11 +417,22 @@ fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool) -> Option<Law> {
     if f[0].real(5, 0.0) != 0.0 {
         f[0].fault(5, "no step at which elements fail", "leave DTF blank");
     }
+    if f[0].real(6, 0.0) != 0.0 {
+        log.warn(f[0].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
+    }
+    if f[0].real(7, 0.0) != 0.0 {
+        let expected = "RATEOP 0: the yield stress follows the logarithm of the rate";
+        f[0].fault(7, expected, "leave it blank, and fit C and EPS0");
+    }
     let (a, n, m) = (f[1].positive(0, "A"), f[1].real(2, 0.0), f[1].real(4, 0.0));
     let (t_melt, t_room) = (f[1].real(5, 0.0), f[1].real(6, 0.0));
     let heat = f[2].real(0, 0.0);
     let d: [f64; 5] =
         [f[2].real(4, 0.0), f[2].real(5, 0.0), f[2].real(6, 0.0), f[2].real(7, 0.0), f[3].real(0, 0.0)];
+    if d.iter().any(|d| *d != 0.0) && f[3].real(3, 0.0) > LEAST_FRACTURE_STRAIN {
+        let expected = "no EFMIN: the strain at fracture has no lower bound but that of its formula";
+        f[3].fault(3, expected, "leave it blank, or fit D1");
+    }
     let cut_off = f[2].real(1, 0.0);
     if cut_off < 0.0 && cut_off > -1e15 {
         f[2].fault(1, "no pressure cut-off", "leave PC blank");
@@ -443,7 +467,7 @@ const SIXTEENS: [usize; 5] = [16; 5];
 pub(super) fn read_eos(block: &Block<'_>, context: &Context<'_>) -> Option<EosCard> {
     let log = context.log;
     let cards = [block.card(0), block.card(1)];
-    let f = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+    let f = [0, 1].map(|i| context.fields(cards[i], block.width, &TENS));
     match block.keyword.as_str() {
         "EOS_GRUNEISEN" | "EOS_004" => {
             for i in [3, 4].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
@@ -484,7 +508,7 @@ pub(super) fn read_eos(block: &Block<'_>, context: &Context<'_>) -> Option<EosCa
             // Volumes, pressures and factors stand on two cards each, where a curve does not have them.
             let rows: [_; 6] = std::array::from_fn(|i| block.card(i + 1));
             let row = |i: usize| {
-                let fields = [i, i + 1].map(|i| context.fields(&rows[i], block.width, &SIXTEENS));
+                let fields = [i, i + 1].map(|i| context.fields(rows[i], block.width, &SIXTEENS));
                 fields.iter().flat_map(|f| (0..5).map(|k| (f.blank(k), f.real(k, 0.0)))).collect::<Vec<_>>()
             };
             let given = curves.iter().any(|curve| curve.value == 0);

@@ -8,15 +8,30 @@ use crate::{log::Log, place::Place};
 /// Deepest nesting of sets of sets.
 const MAX_DEPTH: usize = 20;
 
+/// A walk through sets that name others.
+struct Walk {
+    of_nodes: bool,
+    /// The sets that name one another, down to the present one.
+    path: Vec<u32>,
+    /// Members of the sets that were seen, each of which is looked at once however often it is named.
+    done: BTreeMap<u32, Vec<u32>>,
+}
+
+impl Walk {
+    fn of(of_nodes: bool) -> Self {
+        Self { of_nodes, path: Vec::new(), done: BTreeMap::new() }
+    }
+}
+
 impl Problem {
     /// Nodes of a set, ascending.
     pub(super) fn node_set(&self, id: u32, by: Place, log: &Log<'_>) -> Vec<u32> {
-        self.members(id, by, log, true, 0)
+        self.members(id, (by, log), &mut Walk::of(true))
     }
 
     /// Parts of a set, ascending.
     pub(super) fn part_set(&self, id: u32, by: Place, log: &Log<'_>) -> Vec<u32> {
-        self.members(id, by, log, false, 0)
+        self.members(id, (by, log), &mut Walk::of(false))
     }
 
     /// Solids (0), shells (1) or beams (2) of a set, ascending.
@@ -66,7 +81,9 @@ impl Problem {
         members.into_iter().collect()
     }
 
-    fn members(&self, id: u32, by: Place, log: &Log<'_>, of_nodes: bool, depth: usize) -> Vec<u32> {
+    /// Nodes or parts of a set, and of those that it names.
+    fn members(&self, id: u32, (by, log): (Place, &Log<'_>), walk: &mut Walk) -> Vec<u32> {
+        let of_nodes = walk.of_nodes;
         let (sets, what) = if of_nodes { (&self.sets.nodes, "nodes") } else { (&self.sets.parts, "parts") };
         let Some((at, entries)) = sets.get(&id) else {
             log.fault(
@@ -77,10 +94,24 @@ impl Problem {
             );
             return Vec::new();
         };
-        if depth == MAX_DEPTH {
-            log.fault(by, format!("set {id}"), "sets that do not hold themselves", "list the members");
+        if let Some(start) = walk.path.iter().position(|above| *above == id) {
+            let mut read = format!("set {id}");
+            for other in walk.path.iter().skip(start + 1) {
+                read += &format!(", which names set {other}");
+            }
+            if walk.path.len() > start + 1 {
+                read += &format!(", which names set {id} again");
+            }
+            log.fault(by, read, "sets that do not hold themselves", "list the members of one of them");
             return Vec::new();
         }
+        if walk.path.len() == MAX_DEPTH {
+            let expected = format!("at most {MAX_DEPTH} sets one in another");
+            log.fault(by, format!("set {id}"), expected, "list the members");
+            return Vec::new();
+        }
+        walk.path.push(id);
+        let mut named = BTreeSet::new();
         let mut members: Vec<u32> = Vec::new();
         for (entry, out) in entries {
             let mut found: Vec<u32> = match entry {
@@ -103,7 +134,15 @@ impl Problem {
                     let inside = self.within(*number, *at, log);
                     self.nodes.iter().filter(|n| inside(n.x)).map(|n| n.id).collect()
                 }
-                Entry::Set(other) => self.members(*other, *at, log, of_nodes, depth + 1),
+                // Named once more it adds nothing.
+                Entry::Set(other) if !named.insert(*other) => Vec::new(),
+                Entry::Set(other) => {
+                    if !walk.done.contains_key(other) {
+                        let members = self.members(*other, (*at, log), walk);
+                        walk.done.insert(*other, members);
+                    }
+                    walk.done.get(other).cloned().unwrap_or_default()
+                }
                 Entry::Segment(_) => Vec::new(),
             };
             found.sort_unstable();
@@ -113,6 +152,7 @@ impl Problem {
                 members.append(&mut found);
             }
         }
+        walk.path.pop();
         members.sort_unstable();
         members.dedup();
         let known = |id: &u32| match of_nodes {

@@ -76,7 +76,12 @@ pub(super) fn read_solids(problem: &mut Problem, block: &Block<'_>, context: &Co
             continue;
         }
         let mut corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| nodes.id(first + i));
-        // Tetrahedra and wedges may leave the last fields blank.
+        if corners[5] != 0 && corners[6..] == [0, 0] {
+            let expected = "the fifth and the sixth node of a wedge twice each";
+            nodes.fault(first + 6, expected, "write N1, N2, N3, N4, N5, N5, N6, N6");
+            continue;
+        }
+        // Tetrahedra and pyramids may leave the last fields blank.
         for i in 1..8 {
             if corners[i] == 0 {
                 corners[i] = corners[i - 1];
@@ -107,6 +112,9 @@ pub(super) fn read_shells(problem: &mut Problem, block: &Block<'_>, context: &Co
             };
             let g = context.fields(second, block.width, &[16; 5]);
             corners = [0, 1, 2, 3].map(|i| g.within(i, 0.0, Range::NotNegative));
+            if g.real(4, 0.0) != 0.0 {
+                g.fault(4, "BETA 0: the angle of the material is that of its section", "leave it blank");
+            }
         }
         problem.shells.push(Shell { id: f.id(0), part: f.id(1), nodes, corners, at: card.at });
     }

@@ -32,8 +32,10 @@ pub(super) struct Nozzle {
 
 /// Reads the cards: the number of the load, the nozzle, and what is pressed.
 pub(super) fn read(nozzles: &mut Vec<Nozzle>, block: &Block<'_>, context: &Context<'_>) {
+    // The number of the load stands on the first.
+    block.leave(1);
     let cards = [1, 2].map(|i| block.card(i));
-    let [f, g] = [0, 1].map(|i| context.fields(&cards[i], block.width, &TENS));
+    let [f, g] = [0, 1].map(|i| context.fields(cards[i], block.width, &TENS));
     if let Some(more) = block.cards.iter().skip(3).find(|card| !card.text.trim().is_empty()) {
         let expected = "one nozzle and what it presses, on three cards";
         context.fields(more, block.width, &TENS).fault(0, expected, "write the keyword once for each nozzle");

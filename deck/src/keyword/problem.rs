@@ -1,6 +1,6 @@
 //! What the keywords of a deck say, before it is put into our words: by the numbers that the deck gives.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, btree_map::Entry};
 
 use mechanics::{
     element::{beam2::BeamSection, shell4::InPlane},
@@ -15,6 +15,7 @@ use super::{
     discrete::{Discrete, SpringCard},
     erosion::Limits,
     explosive::DetonationCard,
+    fields::{Context, Fields},
     joint::JointCard,
     material::{EosCard, MaterialCard},
     moving::Nozzle,
@@ -22,7 +23,10 @@ use super::{
     set::Sets,
     stress::StressCard,
 };
-use crate::place::{Origin, Place, Placed};
+use crate::{
+    log::Log,
+    place::{Origin, Place, Placed},
+};
 
 pub(super) struct Node {
     pub(super) id: u32,
@@ -118,6 +122,8 @@ pub(super) enum Section {
 pub(super) struct ShellSection {
     /// Mean of its corners; 0 where elements give theirs.
     pub(super) thickness: f64,
+    /// Whether THEORY of `*CONTROL_SHELL` says which shell it is, as ELFORM is blank.
+    pub(super) is_by_theory: bool,
     /// Points through it.
     pub(super) points: u32,
     /// Whether they are Lobatto's, else Gauss's.
@@ -137,6 +143,8 @@ pub(super) struct Hourglass {
     pub(super) at: Place,
     pub(super) kind: i64,
     pub(super) coefficient: f64,
+    /// Quadratic and linear coefficient of bulk viscosity; 0 is that of the deck.
+    pub(super) viscosity: [f64; 2],
 }
 
 /// `*DEFINE_CURVE`, scaled and offset.
@@ -203,9 +211,46 @@ pub(super) struct Problem {
     /// Contacts whose forces the history is to hold.
     pub(super) transducers: Vec<ContactCard>,
     pub(super) control: ControlCards,
+    /// Where each number of curves, sections and other things that cards name stands.
+    numbers: BTreeMap<(&'static str, u32), Place>,
+    /// Materials that `*MAT_ADD_EROSION` names, and those of the deck that no part has.
+    pub(super) eroded: Vec<Placed<u32>>,
+    pub(super) unused_materials: BTreeSet<u32>,
 }
 
 impl Problem {
+    /// The number in field 0 of a card of something, such as "curve"; one that another of its kind has is a fault.
+    pub(super) fn number(&mut self, what: &'static str, f: &Fields<'_>, context: &Context<'_>) -> u32 {
+        let id = f.id(0);
+        match self.numbers.entry((what, id)) {
+            Entry::Vacant(place) => drop(place.insert(f.at)),
+            Entry::Occupied(first) => {
+                let line = context.log.line(*first.get(), f.at);
+                f.fault(0, format!("a {what} number other than {id}, which {line} has"), "renumber one");
+            }
+        }
+        id
+    }
+
+    /// Reports a shell that `*CONTROL_SHELL` chooses for sections which leave ELFORM blank.
+    pub(super) fn check_theory(&self, log: &Log<'_>) {
+        let is_by_theory = |(_, section): &(Place, Section)| match section {
+            Section::Shell(shell) => shell.is_by_theory,
+            _ => false,
+        };
+        let Some(theory) = self.control.theory.as_ref().filter(|theory| !matches!(theory.value, 0 | 2))
+        else {
+            return;
+        };
+        if let Some((at, _)) = self.sections.values().find(|section| is_by_theory(section)) {
+            let expected = format!(
+                "THEORY 2, or ELFORM in each section: {} leaves it blank",
+                log.line(*at, theory.origin.at)
+            );
+            log.fault_of(theory.origin, expected, "give ELFORM in the sections");
+        }
+    }
+
     /// The place of a node.
     pub(super) fn position(&self, id: u32) -> Option<[f64; 3]> {
         self.node_index.get(&id).map(|n| self.nodes[*n as usize].x)

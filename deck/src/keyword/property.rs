@@ -11,6 +11,9 @@ use super::{
     problem::{Hourglass, PartCard, Problem, Section, ShellSection},
 };
 
+/// Factor of transverse shear of shells.
+const SHEAR_FACTOR: f64 = 5.0 / 6.0;
+
 /// `*PART`: a heading and a card each.
 pub(super) fn read_parts(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>, contact: bool) {
     let step = if contact { 3 } else { 2 };
@@ -23,6 +26,7 @@ pub(super) fn read_parts(problem: &mut Problem, block: &Block<'_>, context: &Con
         let f = context.fields(card, block.width, &TENS);
         read_part(problem, &cards[0], &f, context);
         if contact {
+            cards.iter().for_each(Card::mark);
             context.log.warn(
                 card.at,
                 "*PART_CONTACT: its third card is not used; contact takes its friction from *CONTACT",
@@ -33,6 +37,7 @@ pub(super) fn read_parts(problem: &mut Problem, block: &Block<'_>, context: &Con
 
 /// The heading and the card with the numbers of a part.
 pub(super) fn read_part(problem: &mut Problem, heading: &Card<'_>, f: &Fields<'_>, context: &Context<'_>) {
+    heading.mark();
     let part = PartCard {
         at: f.at,
         title: heading.text.trim().to_string(),
@@ -68,6 +73,7 @@ pub(super) fn read_composite(problem: &mut Problem, block: &Block<'_>, context: 
         );
         return;
     };
+    heading.mark();
     let f = context.fields(card, block.width, &TENS);
     if shell_form(&f, true, context).is_some_and(|(_, is_membrane)| is_membrane) {
         f.fault(1, "shells that bend: a membrane has no plies", "take ELFORM 2");
@@ -113,6 +119,7 @@ pub(super) fn read_composite(problem: &mut Problem, block: &Block<'_>, context: 
     let thickness = layers.iter().map(|ply: &Ply| ply.share).sum();
     let shell = ShellSection {
         thickness,
+        is_by_theory: f.integer(1) == 0,
         points: 1,
         lobatto: false,
         in_plane: InPlane::One,
@@ -154,7 +161,8 @@ pub(super) fn read_solid_sections(problem: &mut Problem, block: &Block<'_>, cont
             ),
             _ => f.fault(1, "ELFORM 1 or 2", "take the Lagrangian solid of one or of eight points"),
         }
-        problem.sections.insert(f.id(0), (card.at, Section::Solid { eight_points }));
+        let id = problem.number("section", &f, context);
+        problem.sections.insert(id, (card.at, Section::Solid { eight_points }));
     }
 }
 
@@ -189,12 +197,21 @@ fn shell_form(f: &Fields<'_>, is_composite: bool, context: &Context<'_>) -> Opti
 
 pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     let mut cards = block.cards.iter();
-    while let Some(card) = cards.next() {
+    while let Some(mut card) = cards.next() {
+        if block.is_headed {
+            card.mark();
+            let Some(first) = cards.next() else { return };
+            card = first;
+        }
         let f = context.fields(card, block.width, &TENS);
         let is_composite = f.integer(6) == 1;
         let (in_plane, is_membrane) = shell_form(&f, is_composite, context).unwrap_or_default();
         if is_membrane && is_composite {
             f.fault(1, "shells that bend: a membrane has no plies", "take ELFORM 2, or ICOMP 0");
+        }
+        let factor = f.real(2, 0.0);
+        if ![0.0, 1.0].contains(&factor) && (factor - SHEAR_FACTOR).abs() > 0.01 {
+            context.log.warn(card.at, format!("SHRF {factor}: the factor of transverse shear is 5/6"));
         }
         let (points, rule) = (f.integer(3), f.real(5, 0.0));
         if rule < 0.0 {
@@ -217,6 +234,13 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
             let g = context.fields(second, block.width, &TENS);
             if g.real(4, 0.0) != 0.0 {
                 g.fault(4, "nodes in the middle of the thickness", "leave NLOC blank");
+            }
+            if g.real(5, 0.0) != 0.0 {
+                g.fault(
+                    5,
+                    "no MAREA: mass that is not structural",
+                    "leave it blank, and put it at nodes by *ELEMENT_MASS",
+                );
             }
             let corners = [0, 1, 2, 3].map(|i| g.real(i, 0.0));
             let all = corners[1..].iter().all(|t| *t > 0.0);
@@ -244,15 +268,27 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
         }
         let (points, lobatto) = if plies.is_empty() { (points as u32, lobatto) } else { (1, false) };
         let (points, lobatto) = if is_membrane { (1, false) } else { (points, lobatto) };
-        let section = ShellSection { thickness, points, lobatto, in_plane, is_membrane, angles, plies };
-        problem.sections.insert(f.id(0), (card.at, Section::Shell(section)));
+        let section = ShellSection {
+            thickness,
+            is_by_theory: f.integer(1) == 0,
+            points,
+            lobatto,
+            in_plane,
+            is_membrane,
+            angles,
+            plies,
+        };
+        let id = problem.number("section", &f, context);
+        problem.sections.insert(id, (card.at, Section::Shell(section)));
     }
 }
 
 pub(super) fn read_hourglass(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
     for card in block.cards.iter().filter(|card| !card.text.trim().is_empty()) {
         let f = context.fields(card, block.width, &TENS);
-        let read = Hourglass { at: card.at, kind: f.integer(1), coefficient: f.real(2, 0.0) };
-        problem.hourglasses.insert(f.id(0), read);
+        let viscosity = [4, 5].map(|i| f.real(i, 0.0));
+        let read = Hourglass { at: card.at, kind: f.integer(1), coefficient: f.real(2, 0.0), viscosity };
+        let id = problem.number("*HOURGLASS", &f, context);
+        problem.hourglasses.insert(id, read);
     }
 }

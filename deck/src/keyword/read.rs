@@ -21,14 +21,16 @@ use crate::{log::Log, place::Place};
 
 /// Keywords of several sections, each with a heading of its own where the keyword ends in `_TITLE`; and the cards of a
 /// section.
-const HEADED: [(&str, usize); 9] = [
+const HEADED: [(&str, usize); 11] = [
     ("SECTION_SOLID", 1),
-    ("SECTION_SHELL", 2),
     ("SECTION_BEAM", 2),
     ("SECTION_DISCRETE", 2),
     ("HOURGLASS", 1),
     ("DEFINE_BOX", 1),
     ("DEFINE_VECTOR", 1),
+    ("DEFINE_COORDINATE_SYSTEM", 2),
+    ("DEFINE_COORDINATE_NODES", 1),
+    ("DEFINE_COORDINATE_VECTOR", 1),
     ("CONSTRAINED_NODAL_RIGID_BODY", 1),
     ("CONSTRAINED_NODAL_RIGID_BODY_SPC", 2),
 ];
@@ -37,19 +39,17 @@ const HEADED: [(&str, usize); 9] = [
 pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
     let mut problem = Problem::default();
     let mut blocks = std::mem::take(&mut lines.blocks);
-    let context = Context { log, parameters: &lines.parameters };
+    let context = Context { log, parameters: &lines.parameters, block: 0 };
     // Coordinate systems may name nodes, whatever stands first.
     let (mut later, mut materials) = (Vec::new(), Vec::new());
     blocks.iter().filter(|block| block.keyword.starts_with("DEFINE_VECTOR")).for_each(|block| {
-        define::read_vectors(&mut problem, block, &context);
+        define::read_vectors(&mut problem, block, &context.of(block));
     });
     for block in &mut blocks {
         if log.is_given_up() {
             break;
         }
-        while block.cards.last().is_some_and(|card| card.text.trim().is_empty()) {
-            block.cards.pop();
-        }
+        block.trim();
         if block.keyword.starts_with("DEFINE_COORDINATE_NODES") {
             later.push(block);
         } else if is_material(&block.keyword) {
@@ -62,7 +62,23 @@ pub(super) fn read(lines: &mut Lines<'_>, log: &Log<'_>) -> Problem {
     for block in later {
         keyword(&mut problem, block, &context);
     }
+    check_eroded(&problem, log);
+    problem.check_theory(log);
     problem
+}
+
+/// Reports materials that `*MAT_ADD_EROSION` names and no card defines.
+fn check_eroded(problem: &Problem, log: &Log<'_>) {
+    let is_known = |id: &u32| {
+        problem.materials.contains_key(id)
+            || problem.springs.contains_key(id)
+            || problem.refused_materials.contains(id)
+            || problem.unused_materials.contains(id)
+    };
+    for material in problem.eroded.iter().filter(|material| !is_known(&material.value) && !log.is_given_up())
+    {
+        log.fault_of(material.origin, "a material of the deck", "add the *MAT, or correct the number");
+    }
 }
 
 /// Whether a keyword belongs to a mesh alone.
@@ -117,6 +133,11 @@ fn take_headings(block: &mut Block<'_>) {
     if !headed || !block.take("_TITLE") || block.cards.is_empty() {
         return;
     }
+    if block.keyword == "SECTION_SHELL" {
+        // A composite has cards of angles behind its two, which are counted as its section is read.
+        block.is_headed = true;
+        return;
+    }
     match HEADED.iter().find(|(word, _)| *word == block.keyword) {
         Some((_, cards)) => {
             let mut n = 0;
@@ -131,13 +152,23 @@ fn take_headings(block: &mut Block<'_>) {
     }
 }
 
+/// Reads a block, all of it: a card that nobody reads is a fault, unless the keyword has one already.
 fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) {
+    let (context, faults) = (&context.of(block), context.log.count());
+    read_keyword(problem, block, context);
+    if context.log.count() == faults {
+        block.check_all_is_read(context.log);
+    }
+}
+
+fn read_keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) {
     let whole = block.keyword.clone();
     take_headings(block);
     let log = context.log;
     match block.keyword.as_str() {
-        "KEYWORD" | "KEYWORD_ID" | "COMMENT" | "PARAMETER_DUPLICATION" => {}
+        "KEYWORD" | "KEYWORD_ID" | "COMMENT" => block.leave_all(),
         "TITLE" => {
+            block.leave_all();
             // That of the deck itself goes before those of its includes.
             let own = block.at.file() == 0;
             if own || problem.title.is_none() {
@@ -164,25 +195,27 @@ fn keyword(problem: &mut Problem, block: &mut Block<'_>, context: &Context<'_>) 
         "DEFINE_VECTOR" => {}
         "DEFINE_BOX" => define::read_box(problem, block, context),
         "DEFINE_COORDINATE_SYSTEM" | "DEFINE_COORDINATE_NODES" | "DEFINE_COORDINATE_VECTOR" => {
-            define::read_system(problem, block, context);
+            define::read_systems(problem, block, context);
         }
         "DAMPING_GLOBAL" => damping::read(problem, block, context),
         "BOUNDARY_NON_REFLECTING" => transmit::read(problem, block, context),
         "INITIAL_DETONATION" => explosive::read_detonations(problem, block, context),
         // Lines that other programs draw.
-        "ELEMENT_PLOTEL" => log.ignore(block.at, "ELEMENT_PLOTEL"),
+        "ELEMENT_PLOTEL" => block.ignore(log),
         "CONTROL_UNITS" => {
             let card = block.card(0);
-            let f = context.fields(&card, block.width, &TENS);
+            let f = context.fields(card, block.width, &TENS);
             let words = [0, 1, 2].map(|i| f.words(i).to_ascii_lowercase());
             problem.units = Some(UnitsCard { at: card.at, words });
         }
         "MAT_ADD_EROSION" | "MAT_000" => {
-            let (id, limits) = erosion::read(block, context);
+            let (material, limits) = erosion::read(block, context);
+            let id = material.value;
+            problem.eroded.push(material);
             problem.erosions.entry(id).or_default().merge(limits);
         }
         word if stress::knows(word) => stress::read(problem, block, context),
-        word if stress::is_of_strain(word) => log.ignore(block.at, word),
+        word if stress::is_of_strain(word) => block.ignore(log),
         word if RigidCards::knows(word) => problem.rigid.read(block, &problem.vectors, context),
         word if joint::knows(word) => joint::read(&mut problem.joints, block, context),
         word if word.starts_with("SET_") => problem.sets.read(block, context),
@@ -221,11 +254,17 @@ fn read_materials(problem: &mut Problem, blocks: Vec<&mut Block<'_>>, context: &
             return;
         }
         take_headings(block);
+        let context = &context.of(block);
         let head = block.card(0);
-        let id = context.fields(&head, block.width, &TENS).id(0);
+        let id = context.fields(head, block.width, &TENS).id(0);
         if of_parts.contains(&id) || of_parts.is_empty() {
+            let faults = context.log.count();
             read_material(problem, block, context, id);
+            if context.log.count() == faults {
+                block.check_all_is_read(context.log);
+            }
         } else {
+            problem.unused_materials.insert(id);
             unused.push((block.at, format!("*{} {id}", context.log.quote(&block.keyword))));
         }
     }
@@ -238,7 +277,7 @@ fn read_materials(problem: &mut Problem, blocks: Vec<&mut Block<'_>>, context: &
 /// Reads a `*MAT_` keyword.
 fn read_material(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>, id: u32) {
     let head = block.card(0);
-    let f = context.fields(&head, block.width, &TENS);
+    let f = context.fields(head, block.width, &TENS);
     let taken = problem.materials.get(&id).map(|first| first.at);
     let taken = taken.or(problem.springs.get(&id).map(|first| first.at));
     if discrete::knows_material(&block.keyword) {
@@ -260,8 +299,7 @@ fn read_material(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>
 
 /// Reads an `*EOS_` keyword.
 fn read_eos(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
-    let head = block.card(0);
-    let id = context.fields(&head, block.width, &TENS).id(0);
+    let id = problem.number("*EOS", &context.fields(block.card(0), block.width, &TENS), context);
     match material::read_eos(block, context) {
         Some(eos) => {
             problem.equations.insert(id, eos);

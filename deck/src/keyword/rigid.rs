@@ -140,11 +140,12 @@ impl RigidCards {
             }),
             word => {
                 let mut cards = block.cards.iter().filter(|card| !card.text.trim().is_empty());
-                if named && word == "CONSTRAINED_SPOTWELD" {
-                    // The number of the weld.
-                    cards.next();
-                }
-                while let Some(card) = cards.next() {
+                while let Some(mut card) = cards.next() {
+                    if named && word == "CONSTRAINED_SPOTWELD" {
+                        // The number of the weld.
+                        card.mark();
+                        card = cards.next().unwrap_or(card);
+                    }
                     let f = context.fields(card, block.width, &TENS);
                     self.line(word, &f);
                     if word.ends_with("_BODY_SPC") {

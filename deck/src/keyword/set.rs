@@ -54,12 +54,12 @@ impl Sets {
             }
             _ => {
                 // What would use it names other sets.
-                context.log.ignore(block.at, &block.keyword);
+                block.ignore(context.log);
                 return;
             }
         };
         let head = block.card(0);
-        let id = context.fields(&head, block.width, &TENS).id(0);
+        let id = context.fields(head, block.width, &TENS).id(0);
         let mut entries = Vec::new();
         for card in block.cards.iter().skip(1) {
             let f = context.fields(card, block.width, &TENS);

@@ -55,7 +55,7 @@ pub(super) fn is_of_strain(keyword: &str) -> bool {
 }
 
 /// Reads the elements of a block, up to one whose cards cannot be told apart.
-pub(super) fn read(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
+pub(super) fn read<'b>(problem: &mut Problem, block: &'b Block<'b>, context: &'b Context<'b>) {
     let Some(layout) = layout(&block.keyword) else { return };
     let mut cards = Cards { block, context, next: 0 };
     while cards.next < block.cards.len() {
@@ -65,15 +65,15 @@ pub(super) fn read(problem: &mut Problem, block: &Block<'_>, context: &Context<'
 }
 
 /// Cards of a block, one after the other.
-struct Cards<'b, 'a> {
-    block: &'b Block<'a>,
+struct Cards<'b> {
+    block: &'b Block<'b>,
     context: &'b Context<'b>,
     next: usize,
 }
 
-impl<'b> Cards<'b, '_> {
+impl<'b> Cards<'b> {
     /// The next card; one that is not there is a fault.
-    fn card(&mut self) -> Option<Card<'b>> {
+    fn card(&mut self) -> Option<&'b Card<'b>> {
         let card = self.block.card(self.next);
         if self.next >= self.block.cards.len() {
             let expected = "a card of stress for each point, and cards of its history variables";
@@ -87,7 +87,7 @@ impl<'b> Cards<'b, '_> {
     /// The stress of an element; none where its cards cannot be told apart.
     fn element(&mut self, layout: Layout) -> Option<StressCard> {
         let head = self.card()?;
-        let f = self.context.fields(&head, self.block.width, &TENS);
+        let f = self.context.fields(head, self.block.width, &TENS);
         let id = f.id(0);
         // Numbers of points, of history variables, the format, and fields that must be blank.
         let (points, history, large, blank): ([i64; 2], _, _, &[usize]) = match layout.kind {
@@ -135,7 +135,7 @@ impl<'b> Cards<'b, '_> {
         let mut n = 0;
         while n < n_own {
             let card = self.card()?;
-            let f = self.context.fields(&card, self.block.width, widths);
+            let f = self.context.fields(card, self.block.width, widths);
             let here = per_card.min(n_own - n);
             for i in 0..here {
                 own[n + i] = f.real(i, 0.0);
@@ -151,7 +151,7 @@ impl<'b> Cards<'b, '_> {
         let mut left = n_history - shared;
         while left > 0 {
             let card = self.card()?;
-            let f = self.context.fields(&card, self.block.width, widths);
+            let f = self.context.fields(card, self.block.width, widths);
             let here = per_card.min(left);
             must_vanish(&f, 0..here);
             left -= here;

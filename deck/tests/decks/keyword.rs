@@ -14,6 +14,7 @@ mod moving;
 mod mutations;
 mod records;
 mod rigid;
+mod silence;
 mod spans;
 mod springs;
 mod stress;

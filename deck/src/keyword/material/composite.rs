@@ -263,6 +263,9 @@ fn honeycomb_law(f: &[Fields<'_>; 8], global: bool, log: &Log<'_>) -> Option<Law
             log.warn(f[0].origin(i, name).at, format!("{name}: the viscosity is that of the deck here"));
         }
     }
+    if !matches!(f[2].real(7, 0.0), 0.0 | 1.0) {
+        f[2].fault(7, "axes in their order", "leave MACF blank and exchange the constants");
+    }
     let curve = f[1].reference(0, "LCA");
     for i in 1..7 {
         let other = f[1].integer(i);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use mechanics::load::{MAX_FORCES, Span};
 
-use super::{moving::is_of_nozzle, state::Translation};
+use super::{element::corners_of, moving::is_of_nozzle, state::Translation};
 use crate::{
     geometry::{dot, sub, unit},
     keyword::{
@@ -300,26 +300,52 @@ fn push_load(t: &mut Translation<'_>, at: Place, title: &str, kind: LoadKind) {
     t.deck.loads.push(Load { at, title: title.to_string(), parts: Parts::All, kind });
 }
 
-/// The nodes of each outer face as they stand around its outward normal, by these nodes ascending: of solids, and of shells, whose upper side
-/// is the outer one, where they are wanted.
-pub(super) fn outward(problem: &Problem, of_shells: bool) -> HashMap<[u32; 4], [u32; 4]> {
-    let mut outward: HashMap<[u32; 4], [u32; 4]> = HashMap::new();
-    let sorted = |mut face: [u32; 4]| {
-        face.sort_unstable();
-        face
-    };
-    for solid in &problem.solids {
-        for face in mechanics::mesh::FACES.map(|face| face.map(|c| solid.nodes[c])) {
-            // A face of two elements is inside, and no pressure acts there.
-            if outward.insert(sorted(face), face).is_some() {
-                outward.remove(&sorted(face));
+/// The nodes of each outer face as they stand around its outward normal: of solids, and of shells, whose upper side is the outer one, where
+/// they are wanted.
+pub(super) struct Outward(HashMap<[u32; 4], [u32; 4]>);
+
+impl Outward {
+    pub(super) fn of(problem: &Problem, of_shells: bool) -> Self {
+        let mut outward: HashMap<[u32; 4], [u32; 4]> = HashMap::new();
+        for solid in &problem.solids {
+            let corners = corners_of(solid.nodes);
+            for face in mechanics::mesh::FACES.map(|face| face.map(|c| corners[c])) {
+                // An element that repeats corners has drawn some of its faces to an edge.
+                let Some(key) = key_of(face) else { continue };
+                // A face of two elements is inside, and no pressure acts there.
+                if outward.insert(key, face).is_some() {
+                    outward.remove(&key);
+                }
             }
         }
+        for shell in problem.shells.iter().filter(|_| of_shells) {
+            if let Some(key) = key_of(shell.nodes) {
+                outward.entry(key).or_insert(shell.nodes);
+            }
+        }
+        Self(outward)
     }
-    for shell in problem.shells.iter().filter(|_| of_shells) {
-        outward.entry(sorted(shell.nodes)).or_insert(shell.nodes);
+
+    /// Whether the nodes of a segment stand around the outward normal of its face; none where it is no outer face.
+    pub(super) fn is_outward(&self, segment: [u32; 4]) -> Option<bool> {
+        let face = self.0.get(&key_of(segment)?)?;
+        let start = face.iter().position(|node| *node == segment[0])?;
+        let next = (1..4).map(|i| face[(start + i) % 4]).find(|node| *node != segment[0]);
+        let second = segment.into_iter().find(|node| *node != segment[0]);
+        Some(next == second)
     }
-    outward
+}
+
+/// The different nodes of a face, ascending; none of one that has less than three.
+fn key_of(mut face: [u32; 4]) -> Option<[u32; 4]> {
+    face.sort_unstable();
+    for i in 1..4 {
+        if face[i] == face[i - 1] {
+            face[i - 1] = u32::MAX;
+        }
+    }
+    face.sort_unstable();
+    (face[2] != u32::MAX).then_some(face)
 }
 
 /// Pressures, by whether segments are listed outward.
@@ -328,7 +354,7 @@ pub(super) fn write_pressures(t: &mut Translation<'_>) {
     if problem.conditions.pressures.is_empty() {
         return;
     }
-    let outward = outward(problem, false);
+    let outward = Outward::of(problem, false);
     // Faces by curve, factor and side.
     type Group = (Place, Vec<[u32; 4]>);
     let mut groups: BTreeMap<(u32, u64), Group> = BTreeMap::new();
@@ -336,19 +362,15 @@ pub(super) fn write_pressures(t: &mut Translation<'_>) {
         let faces =
             if given.set == 0 { given.faces.clone() } else { problem.segment_set(given.set, given.at, log) };
         for face in faces {
-            let mut key = face;
-            key.sort_unstable();
-            let Some(out) = outward.get(&key) else {
+            let Some(same) = outward.is_outward(face) else {
                 log.fault(
                     given.at,
                     format!("segment {face:?}"),
                     "an outer face of a solid",
-                    "name its four nodes",
+                    "name its four nodes, or the three of a triangle",
                 );
                 continue;
             };
-            let start = out.iter().position(|n| *n == face[0]).unwrap_or(0);
-            let same = out[(start + 1) % 4] == face[1];
             let factor = if same { given.factor } else { -given.factor };
             let group = groups.entry((given.curve, factor.to_bits())).or_insert((given.at, Vec::new()));
             group.1.push(face);

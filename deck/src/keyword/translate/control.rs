@@ -8,7 +8,7 @@ const SAFETY: f64 = 0.6666;
 /// That default.
 const STEP_FACTOR: f64 = 0.9;
 /// Bulk viscosity of LS-DYNA, quadratic and linear.
-const VISCOSITY: [f64; 2] = [1.5, 0.06];
+pub(super) const VISCOSITY: [f64; 2] = [1.5, 0.06];
 
 /// Adds them to the deck.
 pub(super) fn write(t: &mut Translation<'_>, units: Option<&str>) {

@@ -2,7 +2,7 @@
 
 use mechanics::element::hourglass::{Hourglass, Kind};
 
-use super::state::Translation;
+use super::{control::VISCOSITY, state::Translation};
 use crate::{
     keyword::{material::Law, problem::Section},
     place::{Origin, Place, Placed},
@@ -29,6 +29,12 @@ pub(super) fn of_part(t: &Translation<'_>, part: u32) -> Option<Placed<Hourglass
         t.log.warn(card.at, format!("HGID {id}: no *HOURGLASS has this number, that of the deck serves"));
         return None;
     };
+    let of_deck = t.problem.control.viscosity.map_or(VISCOSITY, |(_, viscosity)| viscosity);
+    if given.viscosity.iter().zip(of_deck).any(|(own, of_deck)| *own != 0.0 && *own != of_deck) {
+        let [[q1, q2], [quadratic, linear]] = [given.viscosity, of_deck];
+        let words = format!("Q1 {q1}, Q2 {q2}: bulk viscosity is that of the deck, {quadratic} and {linear}");
+        t.log.warn(given.at, words);
+    }
     let mut control = control(t, given.at, given.kind, given.coefficient);
     let material = t.problem.materials.get(&card.material.value);
     if control.is_elastic() && material.is_some_and(|material| matches!(material.law, Law::Null { .. })) {

@@ -1,9 +1,7 @@
 //! Nozzles and the segments that their jets press.
 
-use std::collections::HashMap;
-
 use super::{
-    condition::{driven, outward},
+    condition::{Outward, driven},
     state::Translation,
 };
 use crate::{
@@ -24,7 +22,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
     if problem.nozzles.is_empty() {
         return;
     }
-    let outward = outward(problem, true);
+    let outward = Outward::of(problem, true);
     for (n, nozzle) in (1..).zip(&problem.nozzles) {
         let at = nozzle.at;
         let sides = segments(t, nozzle, &outward);
@@ -82,11 +80,7 @@ fn moves(t: &Translation<'_>, motion: &Motion, node: u32) -> bool {
 }
 
 /// The segments that a nozzle presses: those that are listed outward, and those inward.
-fn segments(
-    t: &Translation<'_>,
-    nozzle: &Nozzle,
-    outward: &HashMap<[u32; 4], [u32; 4]>,
-) -> [Vec<[u32; 4]>; 2] {
+fn segments(t: &Translation<'_>, nozzle: &Nozzle, outward: &Outward) -> [Vec<[u32; 4]>; 2] {
     let (problem, log, at) = (t.problem, t.log, nozzle.at);
     let of_parts = |parts: &[u32]| {
         if let Some(part) = parts.iter().find(|id| !problem.shells.iter().any(|shell| shell.part == **id)) {
@@ -112,16 +106,17 @@ fn segments(
     }
     let mut sides = [Vec::new(), Vec::new()];
     for face in faces {
-        let mut key = face;
-        key.sort_unstable();
-        let Some(out) = outward.get(&key) else {
+        let Some(same) = outward.is_outward(face) else {
             let expected = "an outer face of a solid, or a shell";
-            log.fault(at, format!("segment {face:?}"), expected, "name its four nodes");
+            log.fault(
+                at,
+                format!("segment {face:?}"),
+                expected,
+                "name its four nodes, or the three of a triangle",
+            );
             continue;
         };
-        let start = out.iter().position(|n| *n == face[0]).unwrap_or(0);
-        let next = (1..4).map(|i| out[(start + i) % 4]).find(|n| *n != face[0]);
-        sides[usize::from(next != Some(face[1]))].push(face);
+        sides[usize::from(!same)].push(face);
     }
     sides
 }
