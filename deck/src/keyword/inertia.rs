@@ -50,7 +50,7 @@ pub(super) fn read(problem: &mut Problem, block: &Block<'_>, context: &Context<'
         let g = context.fields(cards[2], block.width, &TENS);
         let tensor = context.fields(cards[3], block.width, &TENS);
         let moves = context.fields(cards[4], block.width, &TENS);
-        property::read_part(problem, &cards[0], &f, context);
+        property::read_part(problem, cards[0], &f, context);
         if g.integer(4) != 0 {
             g.fault(4, "IRCS 0: an inertia along the global axes", "turn the inertia into them");
         }

@@ -51,12 +51,19 @@ struct Definition {
     at: Place,
 }
 
+/// What a name was before a local parameter of a file took it.
+struct Masked {
+    name: String,
+    number: Option<Number>,
+    local: Option<usize>,
+}
+
 /// The parameters of a deck by lower-case name, each with its definitions in the order of the deck.
 #[derive(Default)]
 pub(super) struct Parameters {
     by_name: BTreeMap<String, Vec<Definition>>,
-    /// Local names of the files that are open, the deck first, each with what it was before.
-    open: Vec<Vec<(String, Option<Number>, Option<usize>)>>,
+    /// Local names of the files that are open, the deck first.
+    open: Vec<Vec<Masked>>,
     duplicates: Duplicates,
 }
 
@@ -77,7 +84,7 @@ impl Parameters {
 
     /// Ends a file behind block `next`: its local parameters go.
     pub(super) fn leave(&mut self, next: usize) {
-        for (name, number, local) in self.open.pop().unwrap_or_default().into_iter().rev() {
+        for Masked { name, number, local } in self.open.pop().unwrap_or_default().into_iter().rev() {
             let Some(list) = self.by_name.get_mut(&name) else { continue };
             let Some(at) = list.last().map(|last| last.at) else { continue };
             list.push(Definition { from: next, number, local, at });
@@ -111,7 +118,7 @@ impl Parameters {
             && let Some(names) = self.open.last_mut()
         {
             let (number, local) = before.unwrap_or_default();
-            names.push((name.clone(), number, local));
+            names.push(Masked { name: name.clone(), number, local });
         }
         self.by_name.entry(name).or_default().push(Definition { from, number: Some(number), local, at });
     }

@@ -264,6 +264,7 @@ fn read_materials(problem: &mut Problem, blocks: Vec<&mut Block<'_>>, context: &
                 block.check_all_is_read(context.log);
             }
         } else {
+            check_unused(block, context);
             problem.unused_materials.insert(id);
             unused.push((block.at, format!("*{} {id}", context.log.quote(&block.keyword))));
         }
@@ -271,6 +272,20 @@ fn read_materials(problem: &mut Problem, blocks: Vec<&mut Block<'_>>, context: &
     if let Some((first, _)) = unused.first() {
         let names = unused.iter().map(|(_, name)| name.clone());
         context.log.warn(*first, format!("materials that no part has are left out: {}", first_of(10, names)));
+    }
+}
+
+/// Reports further cards of a material that no part has: a part may have the one that they would be. What its own cards say is of no interest.
+fn check_unused(block: &Block<'_>, context: &Context<'_>) {
+    let quiet = context.log.quiet();
+    let unheard = Context { log: &quiet, parameters: context.parameters, block: context.block };
+    if discrete::knows_material(&block.keyword) {
+        discrete::read_material(block, &unheard);
+    } else {
+        material::read(block, &unheard);
+    }
+    if quiet.count() == 0 {
+        block.check_all_is_read(context.log);
     }
 }
 

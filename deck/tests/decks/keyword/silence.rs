@@ -83,6 +83,10 @@ fn a_card_that_nobody_reads_is_a_fault_of_its_keyword() {
     }
     let two = cube("").replace("0.3\n*NODE", "0.3\n2,2.7e-9,7e4,0.3\n*NODE");
     assert!(faults(&two)[0].contains("no further card of *MAT_ELASTIC"), "{:?}", faults(&two));
+    // Also where the first set is that of no part.
+    let unused = two.replace("\n1,7.85e-9", "\n3,7.85e-9").replace("\n2,2.7e-9", "\n1,2.7e-9");
+    assert!(faults(&unused).iter().any(|fault| fault.contains("no further card of *MAT_ELASTIC")));
+    good("*MAT_ELASTIC\n3,7.85e-9,2.1e5,0.3\n*MAT_WOOD\n4,1,2,3\n5,6,7\n");
     // Cards of zeros, those of other programs and those that a law does without are no further ones.
     for fine in [
         "*DAMPING_GLOBAL\n0,50\n0,0.0\n",
