@@ -15,6 +15,7 @@ use std::{
     fs::{File, OpenOptions},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 pub mod d3plot;
@@ -54,13 +55,20 @@ pub const SUMS: &str = "checksums.json";
 pub use deck::model::FIELD_NAMES;
 pub use summary::Summary;
 
+use tracing::warn;
+
 use crate::disk::sync_folder;
+
+/// What the lock of a folder leaves there on Windows.
+const LOCK: &str = "locked";
 
 /// Why results could not be written or read.
 #[derive(Debug)]
 pub enum Error {
     /// The folder holds something and may not be written over.
     NotEmpty { path: PathBuf },
+    /// Another run writes to the folder.
+    Taken { path: PathBuf },
     /// The operating system refused: disk full, no permission, not a folder.
     Io {
         /// What was tried, as a verb: `create`, `write`, `read`, `rename`, `remove`.
@@ -105,6 +113,11 @@ impl fmt::Display for Error {
                 "results folder {} is not empty; name another with --out, or give --force to replace its results",
                 path.display()
             ),
+            Self::Taken { path } => write!(
+                f,
+                "results folder {}: another run writes to this folder; wait for its end, or name another with --out",
+                path.display()
+            ),
             Self::Io { action, path, source } => {
                 write!(f, "cannot {action} {}: {source}", path.display())?;
                 match source.kind() {
@@ -145,6 +158,8 @@ impl Error {
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
+    /// Held by the run that has claimed it; the system lets go of it when that is killed.
+    _lock: Option<Arc<File>>,
 }
 
 impl Folder {
@@ -156,17 +171,53 @@ impl Folder {
     /// # Errors
     /// [`Error::NotEmpty`] without `force`; [`Error::Io`] if the folder cannot be created, listed or cleared.
     pub fn create(path: &Path, force: bool) -> Result<Self, Error> {
+        let folder = Self::prepare(path, force)?;
+        folder.clear()?;
+        Ok(folder)
+    }
+
+    /// The same for a run that may still fail to begin: what is in the folder stays until [`Folder::clear`], and no other run can claim the
+    /// folder while this value or a clone of it lives.
+    ///
+    /// # Errors
+    /// [`Error::NotEmpty`] without `force`; [`Error::Taken`] if another run has it; [`Error::Io`] if it cannot be created or listed.
+    pub fn claim(path: &Path, force: bool) -> Result<Self, Error> {
+        let folder = Self::prepare(path, force)?;
+        let lock = match system::folders::lock(path) {
+            Ok(Some(lock)) => Some(Arc::new(lock)),
+            Ok(None) => return Err(Error::Taken { path: path.to_owned() }),
+            Err(why) => {
+                warn!("{}: not locked: {why}; see that no other run writes to this folder", path.display());
+                None
+            }
+        };
+        Ok(Self { _lock: lock, ..folder })
+    }
+
+    /// Creates the folder, with its parents, or takes one that is empty or may be written over.
+    fn prepare(path: &Path, force: bool) -> Result<Self, Error> {
         fs::create_dir_all(path).map_err(Error::io("create", path))?;
         for entry in fs::read_dir(path).map_err(Error::io("read", path))? {
-            let entry = entry.map_err(Error::io("read", path))?;
-            if !force {
+            let name = entry.map_err(Error::io("read", path))?.file_name();
+            if !force && name != LOCK {
                 return Err(Error::NotEmpty { path: path.to_owned() });
             }
+        }
+        Ok(Self { path: path.to_owned(), _lock: None })
+    }
+
+    /// Removes the files that a run writes. Other files stay.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the folder cannot be listed or cleared.
+    pub fn clear(&self) -> Result<(), Error> {
+        for entry in fs::read_dir(&self.path).map_err(Error::io("read", &self.path))? {
+            let entry = entry.map_err(Error::io("read", &self.path))?;
             if entry.file_name().to_str().is_some_and(is_written_by_a_run) {
                 fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
             }
         }
-        Ok(Self { path: path.to_owned() })
+        Ok(())
     }
 
     /// Takes a folder as an earlier session of the same run left it, to go on writing.
@@ -175,7 +226,7 @@ impl Folder {
     /// [`Error::Io`] if it cannot be listed.
     pub fn reopen(path: &Path) -> Result<Self, Error> {
         fs::read_dir(path).map_err(Error::io("read", path))?;
-        Ok(Self { path: path.to_owned() })
+        Ok(Self { path: path.to_owned(), _lock: None })
     }
 
     /// BLAKE3 of the files of a state.
@@ -288,6 +339,24 @@ pub fn create_anew(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
+/// Looks whether [`write_whole`] could write a file; what stands under its name stays.
+///
+/// # Errors
+/// [`Error::Io`] with the path of the file.
+pub fn check_writable(path: &Path) -> Result<(), Error> {
+    let temporary = temporary_of(path).filter(|_| !path.is_dir());
+    let temporary = temporary.ok_or_else(|| Error::io("create", path)(io::ErrorKind::IsADirectory.into()))?;
+    create_anew(&temporary).and_then(|_| fs::remove_file(&temporary)).map_err(Error::io("create", path))
+}
+
+/// The temporary name `.NAME.tmp` beside a file; none where the path names no file.
+fn temporary_of(path: &Path) -> Option<PathBuf> {
+    let mut hidden = std::ffi::OsString::from(".");
+    hidden.push(path.file_name()?);
+    hidden.push(".tmp");
+    Some(path.with_file_name(hidden))
+}
+
 /// Writes a file under the temporary name `.NAME.tmp` beside it and renames it, so that readers and killed runs
 /// see the former file or the new one.
 ///
@@ -300,11 +369,7 @@ pub fn write_whole(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Error> {
-    let name = path.file_name().unwrap_or_else(|| panic!("{} names no file", path.display()));
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(".tmp");
-    let temporary = path.with_file_name(hidden);
+    let temporary = temporary_of(path).unwrap_or_else(|| panic!("{} names no file", path.display()));
     let file = create_anew(&temporary).map_err(Error::io("create", path))?;
     let mut out = BufWriter::with_capacity(1 << 16, file);
     // Network file systems report a full disk only when the data is synchronised.

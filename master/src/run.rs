@@ -2,6 +2,7 @@
 
 use std::{
     cell::Cell,
+    fs,
     path::{Path, PathBuf},
     process::ExitCode,
     sync::Arc,
@@ -9,6 +10,7 @@ use std::{
 };
 
 use deck::{bundle::Options, model::Model};
+use mechanics::lanes::Width;
 use tracing::{info, warn};
 
 use crate::{
@@ -25,7 +27,7 @@ use crate::{
     processes::Processes,
     refine,
     results::{self, Folder, Summary, formats, report, summary::Origin, trace},
-    shell::quoted,
+    shell::{print, quoted},
     snapshot::{
         self, Snapshot,
         keeper::Keeper,
@@ -93,18 +95,27 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
         .map(|(i, speed)| WorkerSpec::new(format!("worker-{i}"), speed, threads as u32))
         .collect();
     let path = (!asked.no_output).then(|| folder_for(args));
-    // A run that resumes from its own folder goes on writing there.
-    let own = path.is_some() && args.resume.is_some() && args.resume == path;
-    let resume = args.resume.as_deref().map(|path| resumed_from(path, own)).transpose()?.flatten();
-    let in_place = own && resume.is_some();
-    let folder = path.as_deref().map(|path| match in_place {
-        true => Folder::reopen(path),
-        false => Folder::create(path, args.force || own),
-    });
-    let folder = folder.transpose().map_err(|e| e.to_string())?;
     let interval = interval_for(asked, &model, None);
-    if !interval.is_never() && folder.is_none() {
+    if !interval.is_never() && path.is_none() {
         return Err("snapshots need a results folder; leave out --no-output".to_owned());
+    }
+    if let Some(lanes) = &asked.lanes {
+        // Workers of this machine would refuse them, when the results of before were gone.
+        lanes.parse::<Width>().and_then(Width::require).map_err(|e| e.to_string())?;
+    }
+    // A run that resumes from its own folder goes on writing there.
+    let own = args.resume.as_deref().zip(path.as_deref()).filter(|(from, path)| is_of_folder(from, path));
+    let own = own.map(|(_, path)| path);
+    let resume = args.resume.as_deref().map(|path| resumed_from(path, own)).transpose()?.flatten();
+    let in_place = own.is_some() && resume.is_some();
+    // What is in there stays until nothing can keep the run from beginning.
+    let folder = path.as_deref().map(|path| Folder::claim(path, args.force || own.is_some()));
+    let folder = folder.transpose().map_err(|e| e.to_string())?;
+    if let Some(path) = &args.trace {
+        results::check_writable(path).map_err(|e| e.to_string())?;
+    }
+    if let (Some(snapshot), Some(folder), false) = (&resume, &folder, in_place) {
+        say_what_is_missing(snapshot, folder.path());
     }
     // Nobody is lost who shares this process; a part that is computed twice goes back all the same.
     let memory = asked.keep_every.filter(|_| args.processes || asked.verify > 0.0);
@@ -121,6 +132,11 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     job.forget_start();
     let model = Arc::clone(job.model());
     let census = bare.unwrap_or_else(|| SurfaceCensus::of(&job, &model));
+    let stop = stop_on_interrupt("stopping after this cycle");
+    let children = args.processes.then(|| Processes::start(&specs)).transpose()?;
+    if let (Some(folder), false) = (&folder, in_place) {
+        folder.clear().map_err(|e| e.to_string())?;
+    }
     let mut output = Output::new(Arc::clone(&model), folder, args.json)?;
     output.tells_all = args.verbose;
     output.keep_input(&args.deck.display().to_string(), &text, asked.end_time)?;
@@ -138,8 +154,6 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     if !args.processes && output.keeper.is_none() && asked.verify == 0.0 {
         job.keep_no_state();
     }
-    let stop = stop_on_interrupt("stopping after this cycle");
-    let children = args.processes.then(|| Processes::start(&specs)).transpose()?;
     let started = Instant::now();
     let (outcome, traffic) = match &children {
         Some(children) => children.run(job, first, &mut output, &stop)?,
@@ -155,24 +169,42 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     if let (Some(keeper), true) = (&output.keeper, outcome.stopped && outcome.failure.is_none()) {
         say_how_to_resume(keeper, &output);
     }
-    if let Some(path) = &args.trace {
-        trace::write(path, &outcome.workers, &outcome.reports).map_err(|e| e.to_string())?;
-    }
+    // A trace that cannot be written is told after the results, which are worth more.
+    let traced = args.trace.as_deref().map(|path| trace::write(path, &outcome.workers, &outcome.reports));
     let total_threads = (n * threads) as u32;
-    conclude(&model, &census, &outcome, traffic, total_threads, wall, &output, args.json)
+    let ended = conclude(&model, &census, &outcome, traffic, total_threads, wall, &output, args.json)?;
+    traced.transpose().map_err(|e| e.to_string())?;
+    Ok(ended)
+}
+
+/// Whether what is resumed from is a results folder itself, or a snapshot file in it, by whatever path.
+fn is_of_folder(from: &Path, folder: &Path) -> bool {
+    let (Ok(from), Ok(folder)) = (fs::canonicalize(from), fs::canonicalize(folder)) else { return false };
+    let parent = from.parent().filter(|_| from.is_file());
+    from == folder || parent.is_some_and(|parent| parent == folder || parent == folder.join(store::FOLDER))
 }
 
 /// The snapshot in a file, or the newest whole one of a results folder; what is wrong with newer ones is a warning. One that goes on
 /// where its results are (`own`) counts on its states: where those are damaged whichever snapshot is used, the run begins anew.
-fn resumed_from(path: &Path, own: bool) -> Result<Option<Snapshot>, String> {
+fn resumed_from(path: &Path, own: Option<&Path>) -> Result<Option<Snapshot>, String> {
     if !path.is_dir() {
-        return snapshot::read(path).map(Some);
+        let snapshot = snapshot::read(path)?;
+        if let Some(folder) = own {
+            results::check_states(folder, &snapshot.sums).map_err(|why| {
+                format!(
+                    "{why}; {} counts on it: give --resume {}, or another folder with --out",
+                    path.display(),
+                    folder.display()
+                )
+            })?;
+        }
+        return Ok(Some(snapshot));
     }
     let folder = path.join(store::FOLDER);
     let whole = Cell::new(false);
     let check = |snapshot: &Snapshot| {
         whole.set(true);
-        if own { results::check_states(path, &snapshot.sums) } else { Ok(()) }
+        own.map_or(Ok(()), |folder| results::check_states(folder, &snapshot.sums))
     };
     let (_, found) = Store::open_for(&folder, check)?;
     for why in &found.warnings {
@@ -188,6 +220,18 @@ fn resumed_from(path: &Path, own: bool) -> Result<Option<Snapshot>, String> {
             Ok(None)
         }
         None => Err(format!("no whole snapshot in {}; start the run anew, with --force", folder.display())),
+    }
+}
+
+/// Of a run that goes on in another folder than it began in: which states that will not have.
+fn say_what_is_missing(snapshot: &Snapshot, folder: &Path) {
+    let cycle = snapshot.state.cycle;
+    let missing = snapshot.states.iter().filter(|(written, _)| *written < cycle).count();
+    if missing > 0 {
+        warn!(
+            "{} will lack the {missing} states before cycle {cycle}, which stay where the run began; its history is whole",
+            folder.display()
+        );
     }
 }
 
@@ -250,16 +294,17 @@ pub fn conclude(
         }
         output.seal()?;
     }
-    if json {
-        println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
-    } else {
-        println!("{}", summary.table(&model.units, output.tells_all));
-        if let Some(folder) = &output.folder {
-            println!("results in {}", folder.path().display());
-        }
+    let mut text = match json {
+        true => serde_json::to_string(&summary).map_err(|e| e.to_string())?,
+        false => summary.table(&model.units, output.tells_all),
+    };
+    if let (Some(folder), false) = (&output.folder, json) {
+        text = format!("{}\nresults in {}", text, folder.path().display());
     }
+    let printed = print(&text);
     match (&outcome.failure, outcome.stopped) {
         (Some(reason), _) => Err(reason.clone()),
+        _ if printed.is_err() => printed.map(|()| ExitCode::SUCCESS),
         (None, true) => Ok(ExitCode::from(130)),
         (None, false) => Ok(ExitCode::SUCCESS),
     }
