@@ -43,8 +43,10 @@ export async function draw(number, beside, sheet) {
   $('outcome').hidden = !one;
   if (!one) return;
   const { quality, warnings, origin } = one;
-  $('verdict').textContent = { good: 'good', look: 'look at some measures', bad: 'doubtful' }[quality.grade];
-  $('verdict').className = quality.grade;
+  // Of a run that could not begin nothing can be judged.
+  const grade = quality.measures.length ? quality.grade : '';
+  $('verdict').textContent = { good: 'good', look: 'look at some measures', bad: 'doubtful' }[grade] ?? 'not computed';
+  $('verdict').className = grade;
   $('measures').replaceChildren(
     ...quality.measures.map(({ grade, name, words, advice }) => lists.element('li', { className: grade },
       lists.element('b', { textContent: grade }), ` ${name}: ${words}${advice ? `. ${advice}` : ''}`)),

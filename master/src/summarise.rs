@@ -137,7 +137,11 @@ pub fn summarise(
             .chain(outcome.differences.iter().map(ToString::to_string))
             .chain(waits_warning(outcome.waits, outcome.cycles_run))
             .collect(),
-        quality: quality::judge(model, &parts, outcome, &dead),
+        quality: match outcome.failure.is_some() && outcome.cycles_run == 0 {
+            // Nothing was computed that could be judged.
+            true => quality::Quality::default(),
+            false => quality::judge(model, &parts, outcome, &dead),
+        },
         mirrors: model.output.mirrors,
         units: model.units.clone(),
         origin: Origin::default(),

@@ -57,7 +57,11 @@ impl Summary {
         if !version.is_empty() {
             writeln!(out, "  origin     bolide {version}, {date}, {deck}, on {machine}")?;
         }
-        writeln!(out, "  digest     {}", self.digest)
+        // A run that has no last state has none.
+        match self.digest.is_empty() {
+            true => Ok(()),
+            false => writeln!(out, "  digest     {}", self.digest),
+        }
     }
 
     /// The verdict, and what is not good with what to do about it.
