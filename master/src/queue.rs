@@ -17,7 +17,7 @@ pub const ENDED_LIMIT: usize = 1000;
 pub enum Error {
     /// There is no job of this number.
     Unknown(u32),
-    /// A job that is to be removed waits or runs.
+    /// A job that is to be removed waits, runs or is held.
     NotOver(u32, State),
     /// A job in this state cannot change so.
     Illegal(State, Change),
@@ -32,10 +32,16 @@ impl std::fmt::Display for Error {
         match self {
             Self::Unknown(job) => write!(f, "no job {job}"),
             Self::NotOver(job, state) => {
-                write!(f, "job {job} is {}; `bolide cancel {job}` it first", state.name())
+                write!(f, "job {job} is {}; `bolide cancel {job}` it first", state.name())?;
+                match state {
+                    State::Held => {
+                        write!(f, ", or go on with it by `bolide resume {job}`: it keeps its checkpoint")
+                    }
+                    _ => Ok(()),
+                }
             }
             Self::Illegal(state, change) => {
-                write!(f, "a job that is {} cannot {}", state.name(), format!("{change:?}").to_lowercase())
+                write!(f, "a job that is {} cannot be {}", state.name(), change.participle())
             }
             Self::Full(waiting) => write!(f, "{waiting} jobs wait, at most {QUEUED_LIMIT}; cancel some"),
         }
@@ -59,6 +65,21 @@ pub enum Change {
     Resume,
     /// A user keeps it back, or master or workers die of it again and again: the next one goes on.
     Hold,
+}
+
+impl Change {
+    /// What a job is after it: started.
+    const fn participle(self) -> &'static str {
+        match self {
+            Self::Start => "started",
+            Self::Finish => "finished",
+            Self::Fail => "failed",
+            Self::Cancel => "cancelled",
+            Self::Suspend => "suspended",
+            Self::Resume => "resumed",
+            Self::Hold => "held",
+        }
+    }
 }
 
 /// What a user wants of a job that it has still to come to.
@@ -223,13 +244,13 @@ impl Queue {
         }
     }
 
-    /// Forgets a job that is over.
+    /// Forgets a job that is over. One that is held waits for its user, with a checkpoint that would be lost.
     ///
     /// # Errors
     /// If there is none of this number, or it is not over.
     pub fn remove(&mut self, id: u32) -> Result<Entry, Error> {
         let state = self.jobs.get(&id).ok_or(Error::Unknown(id))?.state;
-        if !is_over(state) {
+        if !is_over(state) || state == State::Held {
             return Err(Error::NotOver(id, state));
         }
         self.jobs.remove(&id).ok_or(Error::Unknown(id))
@@ -429,6 +450,22 @@ mod tests {
         }
         assert_eq!(order, [9, 2, 3, 1, 5, 4]);
         assert_eq!(add(&mut queue), Ok(10), "numbers go on after those of an earlier master");
+    }
+
+    #[test]
+    fn a_held_job_is_not_removed_before_its_user_has_given_it_up() {
+        let mut queue = Queue::new(1);
+        add(&mut queue).expect("room");
+        queue.apply(1, Change::Hold).expect("it waits");
+        let why = queue.remove(1).expect_err("it is held");
+        assert_eq!(
+            why.to_string(),
+            "job 1 is held; `bolide cancel 1` it first, or go on with it by `bolide resume 1`: it keeps its checkpoint"
+        );
+        queue.apply(1, Change::Cancel).expect("it is held");
+        assert!(queue.remove(1).is_ok());
+        let twice = Error::Illegal(State::Done, Change::Cancel).to_string();
+        assert_eq!(twice, "a job that is done cannot be cancelled");
     }
 
     #[test]

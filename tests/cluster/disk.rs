@@ -336,7 +336,7 @@ fn a_job_that_could_not_write_its_results_fails_with_the_reason_and_can_be_gone_
     same_as_undisturbed(&cluster);
     assert!(!cluster.master.wait_for("the job goes on").contains("cycle=0"));
     let again = cluster.client(&["resume", "1"]);
-    assert!(again.err.contains("a job that is done cannot resume"), "{again:?}");
+    assert!(again.err.contains("a job that is done cannot be resumed"), "{again:?}");
 }
 
 #[test]

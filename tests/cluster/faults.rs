@@ -28,7 +28,7 @@ fn a_cancelled_job_keeps_what_it_had_and_frees_its_workers() {
     assert!(cluster.folder().join("spool/job-1/summary.json").is_file());
     let again = cluster.client(&["cancel", "1"]);
     assert_eq!(again.code, Some(1));
-    assert!(again.err.contains("a job that is cancelled cannot cancel"), "{again:?}");
+    assert!(again.err.contains("a job that is cancelled cannot be cancelled"), "{again:?}");
     let unknown = cluster.client(&["cancel", "9"]);
     assert!(unknown.err.contains("no job 9"), "{unknown:?}");
 }
