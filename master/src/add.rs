@@ -9,7 +9,7 @@ use std::{fmt::Write, process::ExitCode, process::Stdio, time::Duration};
 use serde::Serialize;
 use tokio::{io::AsyncWriteExt, process::Command, sync::Semaphore};
 
-use crate::{command::AddArgs, shell::quoted};
+use crate::{command::AddArgs, shell::print, shell::quoted};
 
 pub mod file;
 use file::{Host, Way};
@@ -75,8 +75,8 @@ pub fn run(args: &AddArgs) -> Result<ExitCode, String> {
     let chosen = host_file.choose(&args.names)?;
     if args.dry_run {
         for host in &chosen {
-            println!("# {}", host.name);
-            println!("{} <<'END'\n{}END", shell_line(&ssh(host)), script(host, master));
+            print(&format!("# {}", host.name))?;
+            print(&format!("{} <<'END'\n{}END", shell_line(&ssh(host)), script(host, master)))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -95,18 +95,19 @@ pub fn run(args: &AddArgs) -> Result<ExitCode, String> {
                 start(&host, &script).await
             })
         });
-        let mut answers = Vec::new();
+        let (mut answers, mut printed) = (Vec::new(), Ok(()));
         for (task, host) in tasks.collect::<Vec<_>>().into_iter().zip(&chosen) {
             let answer = task.await.unwrap_or_else(|e| failed(&host.name, &e.to_string()));
             if !args.json {
-                println!("{}", answer.line());
+                // All are waited for, whether or not somebody reads of them.
+                printed = printed.and(print(&answer.line()));
             }
             answers.push(answer);
         }
-        answers
-    });
+        printed.map(|()| answers)
+    })?;
     if args.json {
-        println!("{}", serde_json::to_string(&answers).map_err(|e| e.to_string())?);
+        print(&serde_json::to_string(&answers).map_err(|e| e.to_string())?)?;
     }
     match answers.iter().filter(|answer| answer.outcome == Outcome::Failed).count() {
         0 => Ok(ExitCode::SUCCESS),

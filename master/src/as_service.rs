@@ -13,7 +13,10 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches, Subcommand, ValueHint, pa
 use protocol::tls;
 use system::Service;
 
-use crate::command::{Cli, Command};
+use crate::{
+    command::{Cli, Command},
+    shell::print,
+};
 
 /// What runs as a service.
 const DAEMONS: [&str; 2] = ["master", "worker"];
@@ -103,18 +106,18 @@ pub fn run(
             };
             let told = system::service::install(&service)?;
             let name = service.name;
-            println!("installed {name}: it starts with Windows, and again after failures");
-            told.iter().for_each(|line| println!("{line}"));
+            print(&format!("installed {name}: it starts with Windows, and again after failures"))?;
+            told.iter().try_for_each(|line| print(line))?;
             if matches!(&daemon.command, Command::Worker(args) if args.yield_to_owner.is_some()) {
-                println!(
+                print(&format!(
                     "a service sees no keyboard and no mouse: to yield to whoever types, start a worker at logon"
-                );
+                ))?;
             }
-            println!("start it now: net start {name}");
+            print(&format!("start it now: net start {name}"))?;
         }
         ServiceArgs::Remove { name } => {
             system::service::remove(&name)?;
-            println!("removed {name}; its folder stays");
+            print(&format!("removed {name}; its folder stays"))?;
         }
         ServiceArgs::Run { name, folder, command } => {
             let body = move || match Daemon::parse(&command) {

@@ -13,6 +13,7 @@ use serde::Serialize;
 use crate::{
     deck_file::{Error, gather_deck, warn},
     output,
+    shell::print,
 };
 
 /// What `--json` prints.
@@ -43,7 +44,7 @@ pub fn run(path: &Path, json: bool, options: &Options) -> Result<ExitCode, Strin
         warn(&reading.warnings);
         if let Some(forecast) = &forecast {
             forecast.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-            print!("{name}: no fault{}", words(forecast, &reading.cells));
+            print(&format!("{name}: no fault{}", words(forecast, &reading.cells)))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -57,7 +58,7 @@ pub fn run(path: &Path, json: bool, options: &Options) -> Result<ExitCode, Strin
         forecast,
         cells: read.as_ref().map_or_else(|_| Vec::new(), |reading| reading.cells.clone()),
     };
-    println!("{}", serde_json::to_string_pretty(&checked).map_err(|e| e.to_string())?);
+    print(&serde_json::to_string_pretty(&checked).map_err(|e| e.to_string())?)?;
     Ok(code)
 }
 

@@ -27,6 +27,7 @@ use crate::{
     machine::host_name,
     output::span,
     results::{Folder, Summary, Units, create_anew, summary::significant},
+    shell::print,
     shell::quoted,
 };
 
@@ -289,9 +290,9 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
         return result;
     }
     if args.at.json {
-        println!("{{\"job\":{job}}}");
+        print(&format!("{{\"job\":{job}}}"))?;
     } else {
-        println!("job {job} submitted");
+        print(&format!("job {job} submitted"))?;
         eprintln!("{}", next(job, &args.at));
     }
     Ok(ExitCode::SUCCESS)
@@ -342,7 +343,7 @@ fn finish(
     };
     let ended = status.ended.unwrap_or_default();
     if let Some(text) = if json { ended.summary } else { ended.table } {
-        println!("{text}");
+        print(&text)?;
     }
     match (ended.failure, status.state) {
         (Some(why), _) => Err(format!("job {}: {why}", status.job)),
@@ -385,10 +386,10 @@ pub fn as_json(status: &Status) -> serde_json::Value {
 pub fn jobs(at: &ClientArgs) -> Result<ExitCode, String> {
     let jobs = Client::new(at)?.jobs()?;
     if at.json {
-        println!("{}", serde_json::Value::from_iter(jobs.iter().map(as_json)));
+        print(&serde_json::Value::from_iter(jobs.iter().map(as_json)).to_string())?;
         return Ok(ExitCode::SUCCESS);
     }
-    print!("{}", table(&jobs));
+    print(&table(&jobs))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -438,15 +439,17 @@ fn table(jobs: &[Status]) -> String {
 pub fn hosts(at: &ClientArgs) -> Result<ExitCode, String> {
     let Reply::Hosts(hosts) = Client::new(at)?.ask(&Request::Hosts)? else { return Err(surprise()) };
     if at.json {
-        println!("{}", serde_json::to_string(&hosts).map_err(|e| e.to_string())?);
+        print(&serde_json::to_string(&hosts).map_err(|e| e.to_string())?)?;
         return Ok(ExitCode::SUCCESS);
     }
-    println!(
+    print(&format!(
         "{:>4}  {:<24} {:>7} {:>7}  {:<7} {:<22} {:<5} note",
         "host", "name", "speed", "threads", "lanes", "address", "state"
-    );
+    ))?;
     for HostRow { host, name, speed, threads, lanes, address, state, note, .. } in hosts {
-        println!("{host:>4}  {name:<24} {speed:>7} {threads:>7}  {lanes:<7} {address:<22} {state:<5} {note}");
+        print(&format!(
+            "{host:>4}  {name:<24} {speed:>7} {threads:>7}  {lanes:<7} {address:<22} {state:<5} {note}"
+        ))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -458,9 +461,9 @@ pub fn hosts(at: &ClientArgs) -> Result<ExitCode, String> {
 pub fn act(request: &Request, at: &ClientArgs) -> Result<ExitCode, String> {
     let Reply::Done(what) = Client::new(at)?.ask(request)? else { return Err(surprise()) };
     if at.json {
-        println!("{}", serde_json::json!({ "done": what }));
+        print(&serde_json::json!({ "done": what }).to_string())?;
     } else {
-        println!("{what}");
+        print(&what)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -482,9 +485,9 @@ pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> 
     }
     if at.json {
         let names: Vec<&String> = files.iter().map(|(name, _)| name).collect();
-        println!("{}", serde_json::to_string(&names).map_err(|e| e.to_string())?);
+        print(&serde_json::to_string(&names).map_err(|e| e.to_string())?)?;
     } else {
-        println!("{} files, {total} bytes in {}", files.len(), folder.display());
+        print(&format!("{} files, {total} bytes in {}", files.len(), folder.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -5,7 +5,10 @@ use std::{fs, path::Path, process::ExitCode};
 
 use deck::{bundle::Options, mesh_file::Format};
 
-use crate::deck_file::{self, gather_deck, warn};
+use crate::{
+    deck_file::{self, gather_deck, warn},
+    shell::print,
+};
 
 /// Writes `to`, by default the name of the deck with the ending .toml, and of a keyword deck its mesh.
 ///
@@ -36,11 +39,11 @@ fn start(mesh: &Path, text: &str, to: &Path, force: bool) -> Result<ExitCode, St
     may_write(to, force)?;
     warn(&written.warnings);
     fs::write(to, &written.deck).map_err(|e| format!("{}: {e}", to.display()))?;
-    println!(
+    print(&format!(
         "wrote {}: choose materials, supports and velocities there, then bolide run {}",
         to.display(),
         to.display()
-    );
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -65,6 +68,6 @@ fn convert(deck: &Path, text: &str, to: &Path, force: bool) -> Result<ExitCode, 
     for (path, text) in [(&*mesh, &converted.mesh), (to, &converted.deck)] {
         fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))?;
     }
-    println!("wrote {} and {}", to.display(), mesh.display());
+    print(&format!("wrote {} and {}", to.display(), mesh.display()))?;
     Ok(ExitCode::SUCCESS)
 }

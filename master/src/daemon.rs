@@ -23,6 +23,7 @@ use crate::{
     notify::Notifier,
     scheduler::{Scheduler, retention::Limits},
     scrub,
+    shell::print,
     spool::Spool,
 };
 
@@ -101,7 +102,7 @@ async fn open_page(
     let loopback = address.ip().is_loopback();
     let guard = http::guard::Guard::new(&args.spool, address.port(), loopback, secure, host_name())?;
     let scheme = if secure { "https" } else { "http" };
-    println!("page: {scheme}://{}/?token={}", reachable(address), guard.token());
+    print(&format!("page: {scheme}://{}/?token={}", reachable(address), guard.token()))?;
     let board = Arc::new(Board::default());
     let (notices, board_of_page) = (notices.clone(), Arc::clone(&board));
     let api_state =
@@ -116,12 +117,12 @@ fn announce(address: SocketAddr, certificates: bool, ca_folder: Option<&CaFolder
     let host = reachable(address);
     let certs = if certificates { " --certs FOLDER" } else { "" };
     let join = format!("bolide worker --master {host}{certs}");
-    println!("listening on {address}");
-    println!("workers join with: {join}");
+    print(&format!("listening on {address}"))?;
+    print(&format!("workers join with: {join}"))?;
     if let Some(ca_folder) = ca_folder {
         let token = ca_folder.issue(tls::Role::Worker, FIRST_TOKEN_HOURS).map_err(|e| e.to_string())?;
-        println!("a new PC joins with: {}", line_to_paste(&host, &token, tls::Role::Worker));
-        println!("more such lines: bolide certs token LAB --master {host}");
+        print(&format!("a new PC joins with: {}", line_to_paste(&host, &token, tls::Role::Worker)))?;
+        print(&format!("more such lines: bolide certs token LAB --master {host}"))?;
     }
     Ok(join)
 }

@@ -5,7 +5,10 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Args, builder::PossibleValuesParser};
 use deck::model::FORMAT_NAMES;
 
-use crate::results::{format::Written, formats};
+use crate::{
+    results::{format::Written, formats},
+    shell::print,
+};
 
 /// Flags of `export`.
 #[derive(Args, Clone, Debug)]
@@ -23,7 +26,7 @@ pub struct ExportArgs {
 /// Files that cannot be read or written.
 pub fn run(args: &ExportArgs) -> Result<ExitCode, String> {
     for written in formats::write_all(&args.results, &args.format).map_err(|e| e.to_string())? {
-        println!("{}", line(&written));
+        print(&line(&written))?;
     }
     Ok(ExitCode::SUCCESS)
 }

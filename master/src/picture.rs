@@ -30,6 +30,7 @@ use crate::{
             read::{self, Piece},
         },
     },
+    shell::print,
 };
 
 pub mod arguments;
@@ -85,14 +86,14 @@ fn conclude(
         Legend { title: about.title.clone(), field: legend::words(name, &about.units), moment, range };
     let image = draw(skin, &legend, view_of(args), (args.width, args.height), !args.no_edges);
     write(&args.out, &image)?;
-    println!(
+    print(&format!(
         "{}: {} from {} to {}, {}",
         args.out.display(),
         legend.field,
         legend::number(range.0),
         legend::number(range.1),
         legend.moment
-    );
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 

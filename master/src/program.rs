@@ -65,8 +65,9 @@ pub fn main(compute: Compute) -> ExitCode {
         Command::Certs { what } => make_certificates(what),
         Command::Top { at } => client::top::run(&at),
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "bolide", &mut std::io::stdout());
-            Ok(ExitCode::SUCCESS)
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "bolide", &mut script);
+            print(&String::from_utf8_lossy(&script)).map(|()| ExitCode::SUCCESS)
         }
         Command::Man { out } => manual(out.as_deref()),
         Command::Check { deck, json, reading } => check::run(&deck, json, &reading.options()),
@@ -184,15 +185,15 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
     match what {
         Certs::Ca { folder, force } => {
             let path = certs::make_ca(&folder, force).map_err(|e| e.to_string())?;
-            println!("made {}", path.display());
+            print(&format!("made {}", path.display()))?;
         }
         Certs::Host { folder, name, address, role, force } => {
             certs::make_host(&folder, &name, &address, role.role(), force).map_err(|e| e.to_string())?;
-            println!("made {}; copy this folder to {name}", folder.join(&name).display());
+            print(&format!("made {}; copy this folder to {name}", folder.join(&name).display()))?;
         }
         Certs::Token { folder, role, hours, master } => {
             let token = CaFolder::open(&folder).and_then(|ca| ca.issue(role.role(), hours));
-            println!("{}", daemon::line_to_paste(&master, &token.map_err(|e| e.to_string())?, role.role()));
+            print(&daemon::line_to_paste(&master, &token.map_err(|e| e.to_string())?, role.role()))?;
         }
         Certs::Join { master, token, folder, name } => {
             newcomer::join(
@@ -201,14 +202,14 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
                 &name.unwrap_or_else(machine::host_name),
                 &folder,
             )?;
-            println!("made {}", tls::Paths::in_folder(&folder).certificate.display());
+            print(&format!("made {}", tls::Paths::in_folder(&folder).certificate.display()))?;
         }
         Certs::Revoke { folder, name } => {
             let revoked =
                 CaFolder::open(&folder).and_then(|ca| ca.revoke(&name)).map_err(|e| e.to_string())?;
-            println!(
+            print(&format!(
                 "revoked {revoked} of {name}; a running master with --lab ends its links within seconds"
-            );
+            ))?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -217,9 +218,11 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
 fn manual(folder: Option<&Path>) -> Result<ExitCode, String> {
     let command = Cli::command();
     match folder {
-        None => clap_mangen::Man::new(command)
-            .render(&mut std::io::stdout())
-            .map_err(|e| format!("standard output: {e}"))?,
+        None => {
+            let mut page = Vec::new();
+            clap_mangen::Man::new(command).render(&mut page).map_err(|e| format!("the page: {e}"))?;
+            print(&String::from_utf8_lossy(&page))?;
+        }
         Some(folder) => {
             let fault = |e: std::io::Error| format!("{}: {e}", folder.display());
             std::fs::create_dir_all(folder).map_err(fault)?;

@@ -13,6 +13,7 @@ use crate::{
     deck_file::{gather_deck, read_gathered},
     results::{HISTORY, Summary, Units, history::Table, summary::significant},
     run::{folder_for, run_with},
+    shell::print,
     study::measure::{Facts, Formula, OF_SUMMARY, of_summary},
 };
 
@@ -64,7 +65,7 @@ pub fn run(args: &RunArgs, factor: u32) -> Result<ExitCode, String> {
     }
     let model = read_gathered(&gather_deck(&args.deck, &reading)?, &shown)?;
     let compared = compare(&model, [&coarse, &fine], &formulas)?;
-    print!("{}", table(&compared, factor, &fine));
+    print(&table(&compared, factor, &fine))?;
     Ok(ExitCode::SUCCESS)
 }
 

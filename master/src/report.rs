@@ -22,6 +22,7 @@ use crate::{
     notice::{Error, Notice, WAITING_NOTICES},
     queue,
     results::{HISTORY, PVD, Summary, Units, vtu::read::index},
+    shell::print,
 };
 
 /// Flags of `report`.
@@ -72,8 +73,8 @@ pub fn run(args: &ReportArgs) -> Result<ExitCode, String> {
             guard,
         };
         tokio::spawn(http::serve(place, api_state));
-        println!("page: {page}");
-        println!("Ctrl-C ends it");
+        print(&format!("page: {page}"))?;
+        print("Ctrl-C ends it")?;
         if args.open
             && let Err(why) = open(&page)
         {

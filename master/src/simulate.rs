@@ -33,6 +33,7 @@ use crate::{
     command::SimulateArgs,
     deck_file::read_deck,
     incident::{Loss, Rebalance},
+    shell::print,
 };
 
 use cluster::{Cluster, ElementCost};
@@ -75,7 +76,7 @@ fn model(path: &Path, cycles: u64) -> Result<Arc<Model>, String> {
 /// A JSON object by line.
 fn print_rows<T: Serialize>(rows: &[T]) -> Result<ExitCode, String> {
     for row in rows {
-        println!("{}", serde_json::to_string(row).map_err(|e| e.to_string())?);
+        print(&serde_json::to_string(row).map_err(|e| e.to_string())?)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -86,7 +87,7 @@ fn decomposition(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, Str
     if args.json {
         return print_rows(&rows);
     }
-    print!("{}", mixed::print(&rows, cluster.pair));
+    print(&mixed::print(&rows, cluster.pair))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -95,7 +96,7 @@ fn queued(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
     if args.json {
         return print_rows(&rows);
     }
-    print!("{}", queue::print(&cluster.title, &rows));
+    print(&queue::print(&cluster.title, &rows))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -109,10 +110,10 @@ fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitC
     let (all, medians) =
         measure::run(&model(deck, args.cycles)?, cluster.speeds.len(), lanes, args.repetitions)?;
     if args.json {
-        println!("{}", serde_json::to_string(&medians).map_err(|e| e.to_string())?);
+        print(&serde_json::to_string(&medians).map_err(|e| e.to_string())?)?;
     } else {
-        print!("{}", measure::print(&all, &medians));
-        println!(
+        print(&measure::print(&all, &medians))?;
+        print(&format!(
             "the cluster file: node = {}, pair = {}, search = {}, sort = {}, message_seconds = {:e}, byte_seconds = {:e}",
             cluster.node,
             cluster.pair,
@@ -120,7 +121,7 @@ fn measured(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitC
             cluster.sort,
             cluster.network.message,
             cluster.network.byte
-        );
+        ))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -139,7 +140,7 @@ fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
         if args.json {
             return print_rows(&rows);
         }
-        print!("{}", sweep::print(cluster, &rows));
+        print(&sweep::print(cluster, &rows))?;
         return Ok(ExitCode::SUCCESS);
     }
     let report = table::run(cluster, tables, &models, &mut |cell| eprintln!("{cell}"))?;
@@ -152,7 +153,7 @@ fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
     if args.json {
         return print_rows(&report.rows);
     }
-    print!("{}", table::print(cluster, &report));
+    print(&table::print(cluster, &report))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -234,11 +235,14 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         pictures(folder, &cluster.title, &timeline)?;
     }
     if args.json {
-        println!("{}", serde_json::to_string(&summary).map_err(|e| e.to_string())?);
+        print(&serde_json::to_string(&summary).map_err(|e| e.to_string())?)?;
         return Ok(ExitCode::SUCCESS);
     }
-    println!("{}: modelled under a {} clock, route {}", summary.cluster, summary.clock, summary.route);
-    println!(
+    print(&format!(
+        "{}: modelled under a {} clock, route {}",
+        summary.cluster, summary.clock, summary.route
+    ))?;
+    print(&format!(
         "{} elements, {} hosts, cycles {} to {}: {:.6} s/cycle, {:.4} of the bound {:.6}; {:.0} bytes/cycle",
         summary.elements,
         summary.hosts,
@@ -248,17 +252,17 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
         summary.sec_per_cycle / summary.bound,
         summary.bound,
         summary.bytes_per_cycle
-    );
+    ))?;
     if summary.bytes_between_regions > 0.0 {
-        println!("between regions: {:.0} bytes/cycle", summary.bytes_between_regions);
+        print(&format!("between regions: {:.0} bytes/cycle", summary.bytes_between_regions))?;
     }
     let [elements, nodes, pairs, searched, sorted] = work;
-    println!(
+    print(&format!(
         "work per cycle: {elements:.0} elements, {nodes:.0} nodes, {pairs:.0} pairs, {searched:.0} pairs of new plans, {sorted:.0} surface nodes sorted"
-    );
-    println!("  host  speed     border    contact   interior       send  integrate       wait  (s/cycle)");
+    ))?;
+    print("  host  speed     border    contact   interior       send  integrate       wait  (s/cycle)")?;
     for (i, (p, speed)) in summary.phases.iter().zip(&cluster.speeds).enumerate() {
-        println!(
+        print(&format!(
             "  {:4}  {speed:5}  {:9.6}  {:9.6}  {:9.6}  {:9.6}  {:9.6}  {:9.6}",
             i + 1,
             p.border,
@@ -267,17 +271,17 @@ fn one(args: &SimulateArgs, cluster: &Cluster, deck: &Path) -> Result<ExitCode, 
             p.send,
             p.integrate,
             p.wait
-        );
+        ))?;
     }
     for Rebalance { cycle, imbalance_before, imbalance_after, .. } in summary.rebalances {
-        println!(
+        print(&format!(
             "cycle {cycle}: dealt out anew, imbalance measured {imbalance_before:.3}, foreseen {imbalance_after:.3}"
-        );
+        ))?;
     }
     for Loss { worker, cycle, back_to, why } in summary.losses {
-        println!("cycle {cycle}: {worker} is lost, {why}; back to cycle {back_to}");
+        print(&format!("cycle {cycle}: {worker} is lost, {why}; back to cycle {back_to}"))?;
     }
-    println!("digest {}", summary.digest);
+    print(&format!("digest {}", summary.digest))?;
     Ok(ExitCode::SUCCESS)
 }
 

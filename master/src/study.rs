@@ -42,7 +42,7 @@ use plan::Study;
 use submitted::Submitted;
 use table::{Outcome, Outcomes};
 
-use crate::{client::arguments::ClientArgs, interrupt::stop_on_interrupt, results::write_whole};
+use crate::{client::arguments::ClientArgs, interrupt::stop_on_interrupt, results::write_whole, shell};
 
 /// Name of the list of commands that repeat the points.
 const COMMANDS: &str = "commands.txt";
@@ -65,7 +65,7 @@ fn compute_all(args: &StudyArgs) -> Result<ExitCode, String> {
     let mut course = Course::new(&study, Arc::clone(&cache));
     course.begin()?;
     if args.list {
-        course.list();
+        course.list()?;
         return Ok(ExitCode::SUCCESS);
     }
     fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
@@ -77,17 +77,17 @@ fn compute_all(args: &StudyArgs) -> Result<ExitCode, String> {
     let tally = course.tally;
     let outcomes = course.into_outcomes();
     write(&out, &study, &outcomes)?;
-    print(&study, &outcomes, args.json);
+    print(&study, &outcomes, args.json)?;
     let failed = outcomes.values().filter(|outcome| matches!(outcome, Outcome::Failed(_))).count();
     if !args.json {
-        println!(
+        shell::print(&format!(
             "{} runs: {} computed, {} element-cycles; {} answered from the cache; {failed} failed\nresults in {}",
             outcomes.len(),
             tally.computed,
             tally.element_cycles,
             tally.answered,
             out.display()
-        );
+        ))?;
     }
     if stopped {
         eprintln!("the same command goes on");
@@ -176,7 +176,7 @@ fn write(out: &Path, study: &Study, outcomes: &Outcomes) -> Result<(), String> {
 }
 
 /// Prints what the goal came to, or the table.
-fn print(study: &Study, outcomes: &Outcomes, json: bool) {
+fn print(study: &Study, outcomes: &Outcomes, json: bool) -> Result<(), String> {
     let text = table::goal(study, outcomes).unwrap_or_else(|| table::table(study, outcomes));
     if json {
         let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
@@ -188,14 +188,13 @@ fn print(study: &Study, outcomes: &Outcomes, json: bool) {
                 header.iter().zip(cells).map(|(name, cell)| ((*name).to_owned(), value(cell))).collect()
             })
             .collect();
-        println!("{}", serde_json::json!(rows));
-        return;
+        return shell::print(&serde_json::json!(rows).to_string());
     }
-    print!("{text}");
+    shell::print(&text)?;
     if study.goal.search().is_some() {
         for (values, name, interval) in table::intervals(study, outcomes) {
             let at = course::words(study, &values, study.goal.search().map(|search| search.parameter));
-            println!(
+            shell::print(&format!(
                 "{name}{}{at}: mean {}, {} to {}, deviation {} of {} samples",
                 if at.is_empty() { "" } else { " at " },
                 interval.mean,
@@ -203,7 +202,8 @@ fn print(study: &Study, outcomes: &Outcomes, json: bool) {
                 interval.greatest,
                 interval.deviation,
                 interval.count
-            );
+            ))?;
         }
     }
+    Ok(())
 }

@@ -32,6 +32,7 @@ use crate::{
         INPUT, SUMMARY, SUMS, Summary,
         sums::{self, Checked},
     },
+    shell::print,
     snapshot::{self, Snapshot, store},
 };
 use arguments::VerifyArgs;
@@ -176,12 +177,15 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, String> {
     differences.extend(comparison.into_differences());
     differences.sort_by_key(|difference| difference.cycle);
     let Some(first) = differences.first() else {
-        println!("cycles {from} to {to}: all is equal ({compared})");
+        print(&format!("cycles {from} to {to}: all is equal ({compared})"))?;
         return Ok(ExitCode::SUCCESS);
     };
-    println!("cycles {from} to {to}: the first difference is in cycle {}: {}", first.cycle, first.place);
+    print(&format!(
+        "cycles {from} to {to}: the first difference is in cycle {}: {}",
+        first.cycle, first.place
+    ))?;
     for other in &differences[1..] {
-        println!("cycle {}: {}", other.cycle, other.place);
+        print(&format!("cycle {}: {}", other.cycle, other.place))?;
     }
     Ok(ExitCode::FAILURE)
 }
@@ -191,16 +195,16 @@ fn check_files(results: &Path) -> Result<ExitCode, String> {
     let checked = sums::check(results).map_err(|e| e.to_string())?;
     let Checked { count, damaged } = checked.ok_or_else(|| Error::NoSums(results.to_owned()))?;
     for error in &damaged {
-        println!("{error}");
+        print(&error.to_string())?;
     }
     if damaged.is_empty() {
-        println!("{count} checksums match");
+        print(&format!("{count} checksums match"))?;
         return Ok(ExitCode::SUCCESS);
     }
-    println!(
+    print(&format!(
         "{} of {count} checksums do not match; what can be computed again `bolide verify` names",
         damaged.len()
-    );
+    ))?;
     Ok(ExitCode::FAILURE)
 }
 

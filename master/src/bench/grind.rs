@@ -26,6 +26,7 @@ use crate::{
     event::{Action, WorkerSpec},
     job::Job,
     options::SessionOptions,
+    shell::print,
     simulate::measure::{self, Measured},
 };
 
@@ -275,9 +276,9 @@ pub fn run(args: &GrindArgs) -> Result<ExitCode, String> {
     let lanes = lanes.transpose().map_err(|e| e.to_string())?;
     let report = measured(args.rounds, args.side, lanes)?;
     if args.json {
-        println!("{}", serde_json::to_string(&report).map_err(|e| e.to_string())?);
+        print(&serde_json::to_string(&report).map_err(|e| e.to_string())?)?;
     } else {
-        print!("{}", table(&report));
+        print(&table(&report))?;
     }
     Ok(ExitCode::SUCCESS)
 }

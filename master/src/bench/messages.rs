@@ -25,7 +25,7 @@ use protocol::{
 use serde::Serialize;
 use tokio::net::{TcpListener, TcpStream};
 
-use crate::{certs, command::MessagesArgs};
+use crate::{certs, command::MessagesArgs, shell::print};
 
 /// Interval of heartbeats (ms), as everywhere.
 const HEARTBEAT_MS: u32 = 1000;
@@ -80,15 +80,15 @@ pub fn run(args: &MessagesArgs) -> std::result::Result<ExitCode, String> {
         }
     }
     if args.json {
-        println!("{}", serde_json::json!({ "rows": rows }));
+        print(&serde_json::json!({ "rows": rows }).to_string())?;
     } else {
-        print_table(&rows);
+        print_table(&rows)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn print_table(rows: &[Row]) {
-    println!("{:>10}  {:>5}  {:>6}  {:>14}  {:>8}", "bytes", "kind", "way", "half trip (us)", "MB/s");
+fn print_table(rows: &[Row]) -> std::result::Result<(), String> {
+    print(&format!("{:>10}  {:>5}  {:>6}  {:>14}  {:>8}", "bytes", "kind", "way", "half trip (us)", "MB/s"))?;
     for row in rows {
         let way = match (row.memory, row.tls) {
             (true, _) => "memory",
@@ -96,8 +96,9 @@ fn print_table(rows: &[Row]) {
             (false, false) => "TCP",
         };
         let (half, rate) = (row.half_round_trip_us, row.mb_per_s);
-        println!("{:>10}  {:>5}  {way:>6}  {half:>14.2}  {rate:>8.0}", row.bytes, row.kind);
+        print(&format!("{:>10}  {:>5}  {way:>6}  {half:>14.2}  {rate:>8.0}", row.bytes, row.kind))?;
     }
+    Ok(())
 }
 
 /// Round trips that are timed; a tenth as many go before.
@@ -196,7 +197,7 @@ async fn far_end(address: SocketAddr, certs: Option<&Path>, share_memory: bool) 
     }
     let fault = |error: std::io::Error| Error::io(format!("listening on {address}"), &error);
     let listener = TcpListener::bind(address).await.map_err(fault)?;
-    println!("listening on {}", listener.local_addr().map_err(fault)?);
+    print(&format!("listening on {}", listener.local_addr().map_err(fault)?)).map_err(Error::Message)?;
     let (stream, _) = listener.accept().await.map_err(fault)?;
     let (sender, mut receiver) = answer(stream, config.as_ref(), share_memory).await?;
     loop {

@@ -17,6 +17,7 @@ use super::{
     screen::{Key, Screen, Tint},
     surprise,
 };
+use crate::shell::print;
 
 /// Between two looks.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
@@ -38,11 +39,11 @@ pub fn run(at: &ClientArgs) -> Result<ExitCode, String> {
     let seen = look(&mut client)?;
     if at.json {
         let value = serde_json::json!({ "jobs": seen.jobs, "hosts": seen.hosts });
-        println!("{value}");
+        print(&value.to_string())?;
         return Ok(ExitCode::SUCCESS);
     }
     if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
-        print!("{}", plain(&seen));
+        print(&plain(&seen))?;
         return Ok(ExitCode::SUCCESS);
     }
     show(&mut client, seen, &at.master).map(|()| ExitCode::SUCCESS)

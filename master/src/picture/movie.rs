@@ -13,7 +13,7 @@ use super::{
     legend::{self, Legend},
     open, skin_of, view_of,
 };
-use crate::results::vtu::read;
+use crate::{results::vtu::read, shell::print};
 
 /// How long the last picture stands, in pictures.
 const LAST: u16 = 10;
@@ -92,13 +92,13 @@ pub fn run(args: &PictureArgs, path: &Path) -> Result<ExitCode, String> {
         film.add(&draw_by(&skin, &legend, &camera, size, !args.no_edges))?;
     }
     film.finish()?;
-    println!(
+    print(&format!(
         "{}: {n} states, {} from {} to {}",
         path.display(),
         legend::words(&field, &about.units),
         legend::number(range.0),
         legend::number(range.1)
-    );
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -21,7 +21,10 @@ use super::{
     prepare::{self, Prepared, prepare},
     table::{self, Outcome, Outcomes, Row},
 };
-use crate::results::{Summary, history::Table};
+use crate::{
+    results::{Summary, history::Table},
+    shell::print,
+};
 
 /// Faults of a deck that are printed at most.
 const MOST_FAULTS: usize = 100;
@@ -111,13 +114,21 @@ impl<'a> Course<'a> {
     }
 
     /// Prints the points that are known so far with their identities.
-    pub fn list(&self) {
+    ///
+    /// # Errors
+    /// Standard output cannot be written.
+    pub fn list(&self) -> Result<(), String> {
         for (point, prepared) in &self.ready {
             let known = if self.cache.look(&prepared.identity).is_some() { "  in the cache" } else { "" };
             let sample =
                 self.study.scatter.map_or_else(String::new, |_| format!(", sample {}", point.sample));
-            println!("{}  {}{sample}{known}", prepared.identity, words(self.study, &point.values, None));
+            print(&format!(
+                "{}  {}{sample}{known}",
+                prepared.identity,
+                words(self.study, &point.values, None)
+            ))?;
         }
+        Ok(())
     }
 
     /// Computes all that the goal wants, until it wants no more or `stop` is set.
