@@ -8,6 +8,7 @@
 //! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes, forecast}`, or 422 as above |
 //! | `POST /api/check/surface?name=NAME`, body the deck | the surface before the first cycle, binary |
 //! | `POST /api/jobs/N/cancel`, `hold` or `resume` | `{done}` |
+//! | `GET /api/jobs` | the jobs, as in the overview |
 //! | `GET /api/jobs/N` | the job's status |
 //! | `GET /api/jobs/N/sheet` | energies, imbalance, phases of workers, list of states |
 //! | `GET /api/jobs/N/surface/K?cut=AXIS&at=SHARE&side=SIDE&hide=PARTS` | the surface of state K, binary, as [`surface`](super::surface) says; with a cut, of the elements on one side (`beyond` or `below`) of a plane; without the parts of these indices |
@@ -17,15 +18,18 @@
 //! | `GET /api/jobs/N/files/NAME` | the file |
 //! | `GET /api/jobs/N/results.tar` | all of them in a folder |
 //!
-//! What cannot be done is `{error}` with 404 where there is no such thing, 409 where the state of the job forbids it, 422 where what was sent
-//! is wrong, 500 after a bug or damage here, 503 where the queue is full or the master ends, and 507 where the disk refused.
+//! What cannot be done is `{error}` with 400 where a number or a query cannot be read, 404 where there is no such thing, 405 where the
+//! path has another method, 409 where the state of the job forbids it, 422 where what was sent
+//! is wrong, 413 where it is too long, 500 after a bug or damage here, 503 where the queue is full or the master ends, and 507 where the disk refused.
 
 use std::{convert::Infallible, path::PathBuf, time::Duration};
 
 use axum::{
     Json, Router,
+    body::to_bytes,
     extract::{DefaultBodyLimit, Path, Query, State},
     http::{StatusCode, header},
+    middleware,
     response::{IntoResponse, Response, Sse, sse},
     routing::{get, post},
 };
@@ -53,6 +57,8 @@ use crate::{
 
 /// The shortest time between two events of the stream.
 const EVENT_EVERY: Duration = Duration::from_millis(500);
+/// Most bytes of what the server says when it refuses a request.
+const REFUSAL_LIMIT: usize = 4096;
 /// Most characters of a deck's name.
 const NAME_LIMIT: usize = 200;
 
@@ -62,7 +68,7 @@ pub fn routes() -> Router<ApiState> {
         .route("/overview", get(overview))
         .route("/events", get(events))
         .route("/check", post(check))
-        .route("/jobs", post(submit))
+        .route("/jobs", get(jobs).post(submit))
         .route("/jobs/{job}", get(job))
         .route("/jobs/{job}/cancel", post(cancel))
         .route("/jobs/{job}/hold", post(hold))
@@ -76,6 +82,28 @@ pub fn routes() -> Router<ApiState> {
         .route("/jobs/{job}/results.tar", get(files::archive))
         .route("/check/surface", post(drawn))
         .layer(DefaultBodyLimit::max(DECK_LIMIT))
+        .layer(middleware::map_response(in_json))
+}
+
+/// What the server itself refuses, such as a number that is none, as all that cannot be done is told.
+async fn in_json(answer: Response) -> Response {
+    let (status, headers) = (answer.status(), answer.headers());
+    let kind = headers.get(header::CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or_default();
+    if !(status.is_client_error() || status.is_server_error()) || kind.starts_with("application/json") {
+        return answer;
+    }
+    let allowed = headers.get(header::ALLOW).cloned();
+    let bytes = to_bytes(answer.into_body(), REFUSAL_LIMIT).await.unwrap_or_default();
+    let mut words = String::from_utf8_lossy(&bytes).trim().to_owned();
+    if words.is_empty() {
+        words = status.canonical_reason().unwrap_or("refused").to_owned();
+    }
+    if let Some(allowed) = allowed.as_ref().and_then(|allowed| allowed.to_str().ok()) {
+        words = format!("{words}; this path has {allowed}");
+    }
+    let mut answer = Fault(status, json!({ "error": words })).into_response();
+    answer.headers_mut().extend(allowed.map(|allowed| (header::ALLOW, allowed)));
+    answer
 }
 
 /// What cannot be done.
@@ -160,8 +188,14 @@ async fn events(State(api_state): State<ApiState>) -> impl IntoResponse {
     Sse::new(ReceiverStream::new(receive)).keep_alive(sse::KeepAlive::default())
 }
 
+async fn jobs(State(api_state): State<ApiState>) -> Result<Json<serde_json::Value>, Fault> {
+    let jobs = ask(&api_state.notices, Notice::Jobs).await?;
+    Ok(Json(jobs.into_iter().map(|status| listed(&api_state, status)).collect()))
+}
+
 /// What is asked beside a deck.
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Asked {
     name: Option<String>,
     cycles: Option<u64>,
@@ -235,11 +269,15 @@ async fn submit(
     let brought = desk::read(name.clone(), text).await?;
     let options = JobOptions {
         cycles: asked.cycles,
-        min_workers: asked.min_workers.unwrap_or(1).clamp(1, 10_000),
+        min_workers: asked.min_workers.unwrap_or(1),
         max_workers: asked.max_workers.unwrap_or_default(),
         keep_every: Some(10.0),
         ..JobOptions::default()
     };
+    if options.min_workers == 0 {
+        let why = "min-workers 0: expected a number from 1 to 10000; leave it out for 1";
+        return Err(Fault(StatusCode::UNPROCESSABLE_ENTITY, json!({ "error": why })));
+    }
     options.check().map_err(desk::Error::Options)?;
     let size = brought.size(&options);
     let Brought { text, title, .. } = brought;
@@ -313,6 +351,7 @@ pub async fn folder_of(api_state: &ApiState, job: u32) -> Result<PathBuf, Fault>
 
 /// How a state is to be shown.
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Shown {
     cut: Option<String>,
     at: Option<f64>,

@@ -159,6 +159,7 @@ fn send_archive(folder: &FilePath, job: u32, files: &[(String, u64)], send: &Pie
 
 /// Which columns are wanted, by index, separated by commas.
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Wanted {
     columns: Option<String>,
 }
