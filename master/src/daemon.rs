@@ -58,6 +58,11 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     let result = runtime.block_on(async {
         let listener = TcpListener::bind(args.listen).await.map_err(|e| format!("{}: {e}", args.listen))?;
         let address = listener.local_addr().map_err(|e| e.to_string())?;
+        // Nothing is announced before both are listened at.
+        let place = match args.http {
+            Some(address) => Some(http::Place::open(address, args.certs.as_deref()).await?),
+            None => None,
+        };
         let join = announce(address, tls.is_some(), ca_folder.as_ref())?;
         let ca_folder =
             ca_folder.map(|ca_folder| ca_folder.follow().map(|revoked| (ca_folder, revoked))).transpose();
@@ -72,7 +77,7 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
                 .patient_for(dead_after),
         );
         tokio::spawn(listen(listener, Arc::clone(&acceptor)));
-        let board = open_page(args, join, &notices).await?;
+        let board = place.map(|place| open_page(args, place, join, &notices)).transpose()?;
         let stop = stop_on_interrupt("ending; the job under way is stored for the next master");
         notify::say(&format!("READY=1\nSTATUS=listening on {address}"));
         let limits = Limits {
@@ -90,14 +95,13 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     result
 }
 
-/// Opens the page where one is asked for, and prints its address with its token.
-async fn open_page(
+/// Opens the page, and prints its address with its token.
+fn open_page(
     args: &MasterArgs,
+    place: http::Place,
     join: String,
     notices: &mpsc::Sender<Notice>,
-) -> Result<Option<Arc<Board>>, String> {
-    let Some(address) = args.http else { return Ok(None) };
-    let place = http::Place::open(address, args.certs.as_deref()).await?;
+) -> Result<Arc<Board>, String> {
     let (address, secure) = (place.address()?, place.is_secure());
     let loopback = address.ip().is_loopback();
     let guard = http::guard::Guard::new(&args.spool, address.port(), loopback, secure, host_name())?;
@@ -108,7 +112,7 @@ async fn open_page(
     let api_state =
         http::api_state::ApiState { notices, board: board_of_page, join, only_shows: false, guard };
     tokio::spawn(http::serve(place, api_state));
-    Ok(Some(board))
+    Ok(board)
 }
 
 /// Says where it listens and how workers join; gives the line for workers. The page shows it as well, to whoever may submit
