@@ -48,7 +48,9 @@ fn list() -> String {
 
 fn unknown(name: &str) -> String {
     let names = STARTERS.map(|starter| starter.name);
-    let advice = match nearest(name, names) {
+    // `taylor-bar` is far from `taylor`, which it begins with.
+    let begins = |known: &&str| name.starts_with(known) || !name.is_empty() && known.starts_with(name);
+    let advice = match nearest(name, names).or_else(|| names.into_iter().find(begins)) {
         Some(near) => format!("write {near}"),
         None => "`bolide init` alone lists them".to_owned(),
     };

@@ -86,7 +86,7 @@ pub struct SubmitArgs {
     #[arg(long)]
     pub wait: bool,
     /// Whom to tell when it is over; with --wait
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Whom to tell when it is over, with --wait")]
     pub notify: NotifyArgs,
     /// Write trace.json into the results: what every worker did in its last cycles, for Perfetto
     #[arg(long, conflicts_with = "no_output")]

@@ -29,10 +29,10 @@ const GROUPS: [(&str, &[&str]); 5] = [
 
 /// The first commands of somebody new.
 const EXAMPLES: &str = "Examples:
-  bolide init taylor-bar           # writes taylor-bar.toml, to start from
-  bolide check taylor-bar.toml     # what is wrong with it, what a run takes
-  bolide run taylor-bar.toml       # runs it on this PC
-  bolide report results/taylor-bar --open";
+  bolide init taylor               # writes taylor.toml, to start from
+  bolide check taylor.toml         # what is wrong with it, what a run takes
+  bolide run taylor.toml           # runs it on this PC
+  bolide report results/taylor --open";
 
 pub(super) const RUN_EXAMPLES: &str = "Examples:
   bolide run deck.toml                       # all cores; results in results/deck
@@ -57,7 +57,7 @@ impl Cli {
 
     /// The command, with its subcommands in groups where it lists them.
     fn grouped() -> clap::Command {
-        let command = Self::command();
+        let command = taking_negative_numbers(Self::command());
         let mut list = String::new();
         for (heading, names) in GROUPS {
             let _ = writeln!(list, "{heading}:");
@@ -75,9 +75,60 @@ impl Cli {
     }
 }
 
+/// The command with values that may be negative, so that one that must not is told as a wrong value of its flag and not as an unknown flag.
+fn taking_negative_numbers(command: clap::Command) -> clap::Command {
+    let take = |arg: clap::Arg| match arg.get_action().takes_values() {
+        true => arg.allow_negative_numbers(true),
+        false => arg,
+    };
+    command.mut_args(take).mut_subcommands(taking_negative_numbers)
+}
+
 #[cfg(test)]
 mod tests {
+    use deck::starters::STARTERS;
+
     use super::*;
+
+    #[test]
+    fn the_commands_of_the_examples_can_be_given_and_their_decks_can_be_made() {
+        let texts = [EXAMPLES, RUN_EXAMPLES, SUBMIT_EXAMPLES, PICTURE_EXAMPLES];
+        let examples = texts.iter().flat_map(|text| text.lines().skip(1));
+        let mut made = 0;
+        for example in examples {
+            let words = example.split('#').next().unwrap_or_default().split_whitespace();
+            let cli = Cli::try_parse_from(words).unwrap_or_else(|e| panic!("{example}: {e}"));
+            if let crate::command::Command::Init { name: Some(name), .. } = cli.command {
+                assert!(STARTERS.iter().any(|starter| starter.name == name), "{example}");
+                assert!(EXAMPLES.contains(&format!("bolide run {name}.toml")), "{example}");
+                made += 1;
+            }
+        }
+        assert_eq!(made, 1);
+    }
+
+    #[test]
+    fn a_negative_number_is_a_wrong_value_of_its_flag() {
+        for words in [&["run", "deck.toml", "--cycles", "-5"][..], &["submit", "deck.toml", "--cycles", "-5"]]
+        {
+            let words = std::iter::once("bolide").chain(words.iter().copied());
+            let why =
+                Cli::grouped().try_get_matches_from(words).expect_err("no number of cycles").to_string();
+            assert!(why.contains("invalid value '-5' for '--cycles"), "{why}");
+        }
+    }
+
+    #[test]
+    fn submit_says_that_nobody_is_told_without_wait() {
+        let mut command = Cli::command();
+        let submit = command.find_subcommand_mut("submit").expect("it is there").render_help().to_string();
+        let (_, told) = submit.split_once("Whom to tell when it is over, with --wait:").expect("a heading");
+        let told = told.split("\n\n").next().unwrap_or_default();
+        for flag in ["--notify", "--webhook", "--mail"] {
+            assert!(told.contains(flag), "{flag} in\n{submit}");
+        }
+        assert!(!told.contains("--priority") && !told.contains("--trace"), "{submit}");
+    }
 
     #[test]
     fn every_subcommand_is_in_one_group_of_the_help_and_the_help_fits_its_width() {
