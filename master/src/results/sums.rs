@@ -12,7 +12,9 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{Error, Folder, SUMS, is_of_a_state, is_written_by_a_run, state_name, sum_of_state, write_whole};
+use super::{
+    Error, Folder, SUMS, is_of_a_state, is_written_by_a_run, state_name, sum_of_state, vtu::read, write_whole,
+};
 
 /// The file.
 #[derive(Serialize, Deserialize)]
@@ -83,6 +85,13 @@ pub fn check(folder: &Path) -> Result<Option<Checked>, Error> {
         return Ok(Some(Checked { count: 0, damaged: vec![Error::Damaged { path }] }));
     };
     let mut checked = Checked { count: states.len() + files.len(), damaged: Vec::new() };
+    // A state that was taken away before the sums were written has none, and those behind it neither.
+    for (index, (_, path)) in read::index(folder).unwrap_or_default().into_iter().enumerate() {
+        if let Some(error) = fs::metadata(&path).err().filter(|_| index >= states.len()) {
+            checked.count += 1;
+            checked.damaged.push(Error::io("read", &path)(error));
+        }
+    }
     let of_states = states.iter().enumerate().map(|(index, stated)| {
         (folder.join(state_name(index as u32)), stated, sum_of_state(folder, index as u32))
     });
@@ -131,7 +140,7 @@ fn hex(sum: &[u8; 32]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::PVD, *};
 
     #[test]
     fn every_flipped_bit_and_every_missing_file_is_named_and_what_others_put_there_is_none_of_it() {
@@ -164,5 +173,22 @@ mod tests {
         assert!(found.damaged[0].to_string().contains("state-000001.vtu"), "{found:?}");
         remove(&folder).expect("ours");
         assert!(check(folder.path()).expect("readable").is_none());
+    }
+
+    #[test]
+    fn a_state_that_was_gone_before_the_sums_were_written_is_named_as_well() {
+        let place = tempfile::tempdir().expect("a folder");
+        let folder = Folder::create(place.path(), false).expect("empty");
+        let listed = |index| {
+            format!("<DataSet timestep=\"{index}\" group=\"\" part=\"0\" file=\"{}\"/>\n", state_name(index))
+        };
+        fs::write(folder.file(PVD), [0, 1, 2].map(listed).concat()).expect("room");
+        for index in [0, 2] {
+            fs::write(folder.file(&state_name(index)), "a state").expect("room");
+        }
+        write(&folder, &[]).expect("room");
+        let found = check(folder.path()).expect("readable").expect("it has sums");
+        assert_eq!((found.count, found.damaged.len()), (3, 1), "{found:?}");
+        assert!(found.damaged[0].to_string().contains("state-000001.vtu"), "{found:?}");
     }
 }
