@@ -15,7 +15,7 @@ use system::Service;
 
 use crate::{
     command::{Cli, Command},
-    shell::print,
+    shell::{print, tell},
 };
 
 /// What runs as a service.
@@ -123,7 +123,7 @@ pub fn run(
             let body = move || match Daemon::parse(&command) {
                 Ok(daemon) => code_of(begin(daemon.command)),
                 Err(error) => {
-                    eprintln!("bolide: this executable does not know the flags of its service: {error}");
+                    tell(&format!("bolide: this executable does not know the flags of its service: {error}"));
                     WRONG_FLAGS
                 }
             };
@@ -138,7 +138,7 @@ fn code_of(result: Result<ExitCode, String>) -> u8 {
     match result {
         Ok(_) => 0,
         Err(reason) => {
-            eprintln!("bolide: {reason}");
+            tell(&format!("bolide: {reason}"));
             1
         }
     }

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::{
     deck_file::{Error, gather_deck, warn},
     output,
-    shell::print,
+    shell::{print, tell},
 };
 
 /// What `--json` prints.
@@ -43,7 +43,7 @@ pub fn run(path: &Path, json: bool, options: &Options) -> Result<ExitCode, Strin
         let reading = read.map_err(|faults| Error::of_faults(lines(&faults)))?;
         warn(&reading.warnings);
         if let Some(forecast) = &forecast {
-            forecast.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+            forecast.warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
             print(&format!("{name}: no fault{}", words(forecast, &reading.cells)))?;
         }
         return Ok(ExitCode::SUCCESS);

@@ -27,8 +27,7 @@ use crate::{
     machine::host_name,
     output::span,
     results::{Folder, Summary, Units, create_anew, summary::significant},
-    shell::print,
-    shell::quoted,
+    shell::{print, quoted, tell},
 };
 
 pub mod arguments;
@@ -222,9 +221,9 @@ impl Line {
         }
         if self.stays {
             // Without wrapping, so that a narrow terminal has one line too.
-            eprint!("\r\x1b[?7l{line}\x1b[K\x1b[?7h");
+            let _ = write!(std::io::stderr(), "\r\x1b[?7l{line}\x1b[K\x1b[?7h");
         } else if self.is_due(state, Instant::now()) {
-            eprintln!("{line}");
+            tell(&line);
             self.at = Instant::now();
         }
         self.state = Some(state);
@@ -240,7 +239,7 @@ impl Line {
 impl Drop for Line {
     fn drop(&mut self) {
         if self.stays && !self.last.is_empty() {
-            eprintln!();
+            tell("");
         }
     }
 }
@@ -283,7 +282,7 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
     let job = client.submit(name, text, options)?;
     if args.wait {
         if !args.at.json {
-            eprintln!("job {job} submitted");
+            tell(&format!("job {job} submitted"));
         }
         let result = finish(client, &args.at, Some(job), None);
         args.notify.tell_of(&job.to_string(), None, &result);
@@ -293,7 +292,7 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
         print(&format!("{{\"job\":{job}}}"))?;
     } else {
         print(&format!("job {job} submitted"))?;
-        eprintln!("{}", next(job, &args.at));
+        tell(&format!("{}", next(job, &args.at)));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -334,7 +333,7 @@ fn finish(
             Ok(status) => break status,
             Err(why) if client.gone && client.following.is_some() => {
                 job = client.following;
-                eprintln!("{why}; dialling again for {} s", RETURN_LIMIT.as_secs());
+                tell(&format!("{why}; dialling again for {} s", RETURN_LIMIT.as_secs()));
                 client = dial_again(at, &why)?;
                 client.following = job;
             }

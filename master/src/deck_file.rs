@@ -11,6 +11,8 @@ use deck::{
     physics,
 };
 
+use crate::shell::tell;
+
 /// Reads and checks a deck.
 ///
 /// # Errors
@@ -42,14 +44,14 @@ pub fn read_gathered(text: &str, name: &str) -> Result<Model, Error> {
 /// Tells what is done otherwise than a deck says, on standard error.
 pub fn warn(warnings: &[deck::Warning]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        tell(&format!("warning: {warning}"));
     }
 }
 
 /// Tells what is hardly meant by a deck that runs, on standard error.
 pub fn doubt(model: &Model) {
     for warning in physics::forecast(model).warnings {
-        eprintln!("warning: {warning}");
+        tell(&format!("warning: {warning}"));
     }
 }
 

@@ -7,6 +7,8 @@ use std::sync::{
 
 use system::interrupts::Interrupts;
 
+use crate::shell::tell;
+
 /// A flag that Ctrl-C, or another request to end, sets, saying `what` happens now; a second one ends the process at once.
 pub fn stop_on_interrupt(what: &'static str) -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
@@ -25,7 +27,7 @@ pub fn stop_on_interrupt(what: &'static str) -> Arc<AtomicBool> {
                 if flag.swap(true, Ordering::Relaxed) {
                     std::process::exit(130);
                 }
-                eprintln!("{what}; once more to leave at once");
+                tell(&format!("{what}; once more to leave at once"));
             }
         });
     });

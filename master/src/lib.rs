@@ -6,8 +6,8 @@
 //! [`ca_folder`] has its tokens and revoked certificates, [`newcomer`] how a bare PC gets one; [`neighbour`] whose process calls on loopback; [`processes`] starts workers as
 //! children for one run, [`add`] over ssh, [`as_service`] has Windows do it. [`mod@bench`] measures. [`simulate`] drives the sessions on an emulated cluster. [`mod@study`] runs a deck with many values of its parameters. [`program`] is the command line.
 
-// What prints without asking whether it can be printed panics where a pipe is closed or a disk full; `shell::print` asks.
-#![cfg_attr(not(test), deny(clippy::print_stdout))]
+// What prints without asking whether it can be printed panics where a pipe is closed or a disk full; `shell` has what asks.
+#![cfg_attr(not(test), deny(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod add;
 pub mod as_service;

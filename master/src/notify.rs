@@ -12,7 +12,7 @@ use clap::Args;
 use protocol::request::{Ended, State};
 use tracing::warn;
 
-use crate::machine::host_name;
+use crate::{machine::host_name, shell::tell};
 
 pub mod mail;
 pub mod webhook;
@@ -105,7 +105,7 @@ impl NotifyArgs {
 
     /// [`tell`](Self::tell) of a command of this process; faults go to standard error.
     pub fn tell_of(&self, job: &str, folder: Option<&Path>, result: &Result<ExitCode, String>) {
-        self.tell(&Over::of(job, folder, result)).iter().for_each(|fault| eprintln!("{fault}"));
+        self.tell(&Over::of(job, folder, result)).iter().for_each(|fault| tell(fault));
     }
 }
 

@@ -19,6 +19,7 @@ use crate::{
         vtu::Series,
         writer::Writer,
     },
+    shell::tell,
     snapshot::{self, Snapshot, keeper::Keeper},
 };
 
@@ -231,7 +232,7 @@ impl Output {
                 bar.set_position((share * 1000.0) as u64);
                 bar.set_message(line);
             }
-            None => eprintln!("{line}"),
+            None => tell(&line),
         }
     }
 

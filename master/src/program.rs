@@ -23,19 +23,39 @@ use crate::{
     check, client,
     command::{Bench, Cli, Command, WorkerArgs},
     convert, daemon, export, init, machine, materials, newcomer, picture, processes, report, run,
-    shell::print,
+    shell::{print, tell},
     simulate, study, verify,
 };
 
 /// The log: to standard error, of the levels that `BOLIDE_LOG` says (`debug`, or by module `info,worker=debug`), else from
-/// `info` on.
+/// `info` on; what it says wrong is told there.
 pub fn log<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
-    let asked = std::env::var("BOLIDE_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let text = std::env::var("BOLIDE_LOG").ok().filter(|text| !text.trim().is_empty());
+    let asked = text.and_then(|text| {
+        levels(&text)
+            .map_err(|why| tell(&format!("bolide: BOLIDE_LOG={text}: {why}; logging from info on")))
+            .ok()
+    });
     tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
+        // That a line cannot be written cannot be told there either.
+        .log_internal_errors(false)
         .with_filter(asked.unwrap_or_else(|| Targets::new().with_default(LevelFilter::INFO)))
+}
+
+/// What `BOLIDE_LOG` says. A word alone that is no level would be taken for a module, of which there is none, and nothing be logged.
+fn levels(text: &str) -> Result<Targets, String> {
+    for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {
+        let level = item.rsplit_once('=').map_or(item, |(_, level)| level);
+        if level.parse::<LevelFilter>().is_err() {
+            return Err(format!(
+                "expected off, error, warn, info, debug or trace, or MODULE=LEVEL, separated by commas; found {item:?}"
+            ));
+        }
+    }
+    text.parse().map_err(|e| format!("{e}"))
 }
 
 /// Does what the command line says. `compute` is what computes the tasks of a worker.
@@ -86,7 +106,7 @@ pub fn main(compute: Compute) -> ExitCode {
         Command::Materials(args) => materials::run(&args),
     };
     result.unwrap_or_else(|reason| {
-        eprintln!("bolide: {reason}");
+        tell(&format!("bolide: {reason}"));
         ExitCode::FAILURE
     })
 }
@@ -140,6 +160,7 @@ fn work(args: WorkerArgs, compute: Compute) -> Result<ExitCode, String> {
             speed
         }
     };
+    machine::warn_of_threads(args.threads.unwrap_or(cores) as usize);
     let options = worker::daemon::Options {
         master: args.master,
         name: match args.name {
@@ -230,4 +251,21 @@ fn manual(folder: Option<&Path>) -> Result<ExitCode, String> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_of_the_log_are_taken_and_other_words_are_named() {
+        for good in ["debug", "info,worker=debug", "WARN", "off", "info, worker=trace"] {
+            assert!(levels(good).is_ok(), "{good}");
+        }
+        for bad in ["nonsense", "info,worker", "worker=loud"] {
+            let why = levels(bad).expect_err(bad);
+            let item = bad.rsplit(',').next().unwrap_or_default();
+            assert!(why.starts_with("expected off, error, warn") && why.contains(item), "{why}");
+        }
+    }
 }

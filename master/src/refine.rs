@@ -13,7 +13,7 @@ use crate::{
     deck_file::{gather_deck, read_gathered},
     results::{HISTORY, Summary, Units, history::Table, summary::significant},
     run::{folder_for, run_with},
-    shell::print,
+    shell::{print, tell},
     study::measure::{Facts, Formula, OF_SUMMARY, of_summary},
 };
 
@@ -50,11 +50,11 @@ pub fn run(args: &RunArgs, factor: u32) -> Result<ExitCode, String> {
     // What is wrong with the finer deck, or with a formula, is told before the first run and not after it.
     let model = read_gathered(&gather_deck(&args.deck, &finer)?, &shown)?;
     let formulas = formulas(&args.measure)?;
-    eprintln!(
+    tell(&format!(
         "{} elements with cells {factor} times finer; that run takes some {} times as long as the first",
         model.mesh.n_elements(),
         u64::from(factor).pow(4)
-    );
+    ));
     drop(model);
     for (folder, reading) in [(&coarse, &reading), (&fine, &finer)] {
         let args = RunArgs { out: Some(folder.clone()), ..args.clone() };

@@ -22,7 +22,7 @@ use crate::{
     notice::{Error, Notice, WAITING_NOTICES},
     queue,
     results::{HISTORY, PVD, Summary, Units, vtu::read::index},
-    shell::print,
+    shell::{print, tell},
 };
 
 /// Flags of `report`.
@@ -79,7 +79,7 @@ pub fn run(args: &ReportArgs) -> Result<ExitCode, String> {
             && let Err(why) = open(&page)
         {
             // It serves all the same.
-            eprintln!("{why}");
+            tell(&why);
         }
         let stop = stop_on_interrupt("ending");
         while !stop.load(Ordering::Relaxed) {

@@ -21,13 +21,14 @@ use crate::{
     export,
     interrupt::stop_on_interrupt,
     job::Job,
+    machine,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
     picture,
     processes::Processes,
     refine,
     results::{self, Folder, Summary, formats, report, summary::Origin, trace},
-    shell::{print, quoted},
+    shell::{print, quoted, tell},
     snapshot::{
         self, Snapshot,
         keeper::Keeper,
@@ -81,6 +82,7 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     // Workers of one process share a pool; processes share the cores.
     let share = if args.processes { (cores / n).max(1) } else { cores };
     let threads = args.threads.map_or(share, |t| t as usize);
+    machine::warn_of_threads(if args.processes { n * threads } else { threads });
     // The start takes no more threads than the run; a pool that a process has already stays.
     let of_start = if args.processes { cores.min(n * threads) } else { threads };
     let _ = rayon::ThreadPoolBuilder::new().num_threads(of_start).build_global();
@@ -155,17 +157,18 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
         job.keep_no_state();
     }
     let started = Instant::now();
-    let (outcome, traffic) = match &children {
-        Some(children) => children.run(job, first, &mut output, &stop)?,
+    let ran = match &children {
+        Some(children) => children.run(job, first, &mut output, &stop),
         None => {
             let pool = threads.max(cores.min(n * threads));
-            embedded::run(job, first, n, pool, &mut output, &stop)?
+            embedded::run(job, first, n, pool, &mut output, &stop)
         }
     };
     let wall = started.elapsed().as_secs_f64();
     drop(children);
     output.finish();
-    output.flush()?;
+    let (outcome, traffic) =
+        ran.and_then(|ran| output.flush().map(|()| ran)).inspect_err(|_| say_what_is_stored(&output))?;
     if let (Some(keeper), true) = (&output.keeper, outcome.stopped && outcome.failure.is_none()) {
         say_how_to_resume(keeper, &output);
     }
@@ -241,10 +244,23 @@ fn say_how_to_resume(keeper: &Keeper, output: &Output) {
     match (kept.refused, &output.folder) {
         (None, Some(folder)) if kept.cycle.is_some() => {
             let cycle = kept.cycle.unwrap_or_default();
-            eprintln!("stored at cycle {cycle}; go on with: {}", resuming_command(folder.path()));
+            tell(&format!("stored at cycle {cycle}; go on with: {}", resuming_command(folder.path())));
         }
-        (Some(why), _) => eprintln!("not stored: {why}"),
-        _ => eprintln!("not stored: nothing was computed"),
+        (Some(why), _) => tell(&format!("not stored: {why}")),
+        _ => tell("not stored: nothing was computed"),
+    }
+}
+
+/// After a fault that no result tells of, such as a full disk: where the run can be gone on with.
+fn say_what_is_stored(output: &Output) {
+    let (Some(keeper), Some(folder)) = (&output.keeper, &output.folder) else { return };
+    match keeper.flush().cycle {
+        Some(cycle) => {
+            tell(&format!("stored at cycle {cycle}; go on with: {}", resuming_command(folder.path())))
+        }
+        None => tell(
+            "nothing is stored to go on from; with --snapshot-every SECONDS a run is stored while it goes",
+        ),
     }
 }
 

@@ -14,6 +14,11 @@ pub fn print(text: &str) -> Result<(), String> {
     }
 }
 
+/// Tells a person something beside what is printed, on standard error. Where that cannot be written nobody hears it, and the work goes on.
+pub fn tell(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
 /// A word as a shell takes it.
 pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);

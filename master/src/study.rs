@@ -42,7 +42,12 @@ use plan::Study;
 use submitted::Submitted;
 use table::{Outcome, Outcomes};
 
-use crate::{client::arguments::ClientArgs, interrupt::stop_on_interrupt, results::write_whole, shell};
+use crate::{
+    client::arguments::ClientArgs,
+    interrupt::stop_on_interrupt,
+    results::write_whole,
+    shell::{self, tell},
+};
 
 /// Name of the list of commands that repeat the points.
 const COMMANDS: &str = "commands.txt";
@@ -90,7 +95,7 @@ fn compute_all(args: &StudyArgs) -> Result<ExitCode, String> {
         ))?;
     }
     if stopped {
-        eprintln!("the same command goes on");
+        tell("the same command goes on");
         return Ok(ExitCode::from(130));
     }
     if failed > 0 {

@@ -32,7 +32,7 @@ use crate::{
         INPUT, SUMMARY, SUMS, Summary,
         sums::{self, Checked},
     },
-    shell::print,
+    shell::{print, tell},
     snapshot::{self, Snapshot, store},
 };
 use arguments::VerifyArgs;
@@ -168,7 +168,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, String> {
         let digest = summary.as_ref().filter(|_| ends.min(to) == end).map(|summary| summary.digest.as_str());
         let whole = interval(args, &model, (first, ends.min(to)), (last, digest), &mut comparison, &stop)?;
         if !whole {
-            eprintln!("bolide: stopped; nothing behind cycle {begins} is verified");
+            tell(&format!("bolide: stopped; nothing behind cycle {begins} is verified"));
             return Ok(ExitCode::from(130));
         }
     }
@@ -297,7 +297,7 @@ fn interval(
     comparison.end()?;
     // A run that fails there failed so before: what it wrote is compared all the same.
     if let Some(why) = outcome.failure {
-        eprintln!("bolide: the run ends with: {why}");
+        tell(&format!("bolide: the run ends with: {why}"));
     }
     if let (Some(snapshot), Some(state)) = (last, &outcome.state) {
         comparison.snapshot(&model, &snapshot.state, state);

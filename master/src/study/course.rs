@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     results::{Summary, history::Table},
-    shell::print,
+    shell::{print, tell},
 };
 
 /// Faults of a deck that are printed at most.
@@ -261,7 +261,7 @@ impl<'a> Course<'a> {
             }
             Outcome::Failed(why) => why.clone(),
         };
-        eprintln!("{at}{sample}: {told} ({how})");
+        tell(&format!("{at}{sample}: {told} ({how})"));
         self.outcomes.insert(point, outcome);
     }
 }
