@@ -1,13 +1,17 @@
 //! The daemons as real processes: the same digest as `bolide run`, and what goes wrong stays where it is.
 
 mod add;
+mod begin;
 mod disk;
 mod faults;
+mod http;
 mod links;
 mod losses;
 mod memory;
 mod owner;
 mod peers;
+#[cfg(target_os = "linux")]
+mod printing;
 mod runs;
 mod slurm;
 mod study;

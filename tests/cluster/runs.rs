@@ -231,6 +231,9 @@ fn a_job_that_is_held_gives_its_workers_away_and_goes_on_where_it_was_stored() {
     assert!(until_done.code == Some(1) && until_done.err.contains("job 1 is held"), "{until_done:?}");
     let twice = cluster.client(&["hold", "1"]);
     assert!(twice.code == Some(1) && twice.err.contains("a job that is held cannot be held"), "{twice:?}");
+    let removed = cluster.client(&["rm", "1"]);
+    assert!(removed.code == Some(1) && removed.err.contains("`bolide resume 1`"), "{removed:?}");
+    assert!(cluster.snapshots(1).is_dir(), "it keeps its checkpoint");
 
     // Its worker computes another one, and a new master knows that it is held.
     let short = cluster.json(&["submit", &small(), "--cycles", "40", "--no-output", "--wait"]);

@@ -86,6 +86,7 @@ fn taking_negative_numbers(command: clap::Command) -> clap::Command {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser as _;
     use deck::starters::STARTERS;
 
     use super::*;

@@ -81,6 +81,7 @@ pub fn routes() -> Router<ApiState> {
         .route("/jobs/{job}/files/{name}", get(files::file))
         .route("/jobs/{job}/results.tar", get(files::archive))
         .route("/check/surface", post(drawn))
+        .fallback(|| async { missing("no such path".to_owned()) })
         .layer(DefaultBodyLimit::max(DECK_LIMIT))
         .layer(middleware::map_response(in_json))
 }
