@@ -232,7 +232,7 @@ fn say_what_is_missing(snapshot: &Snapshot, folder: &Path) {
     let missing = snapshot.states.iter().filter(|(written, _)| *written < cycle).count();
     if missing > 0 {
         warn!(
-            "{} will lack the {missing} states before cycle {cycle}, which stay where the run began; its history is whole",
+            "{} will lack the states before cycle {cycle}, {missing} in number, which stay where the run began; its history is whole",
             folder.display()
         );
     }

@@ -93,18 +93,12 @@ async fn in_json(answer: Response) -> Response {
     if !(status.is_client_error() || status.is_server_error()) || kind.starts_with("application/json") {
         return answer;
     }
-    let allowed = headers.get(header::ALLOW).cloned();
     let bytes = to_bytes(answer.into_body(), REFUSAL_LIMIT).await.unwrap_or_default();
     let mut words = String::from_utf8_lossy(&bytes).trim().to_owned();
     if words.is_empty() {
         words = status.canonical_reason().unwrap_or("refused").to_owned();
     }
-    if let Some(allowed) = allowed.as_ref().and_then(|allowed| allowed.to_str().ok()) {
-        words = format!("{words}; this path has {allowed}");
-    }
-    let mut answer = Fault(status, json!({ "error": words })).into_response();
-    answer.headers_mut().extend(allowed.map(|allowed| (header::ALLOW, allowed)));
-    answer
+    Fault(status, json!({ "error": words })).into_response()
 }
 
 /// What cannot be done.
