@@ -109,9 +109,9 @@ pub fn run(
             print(&format!("installed {name}: it starts with Windows, and again after failures"))?;
             told.iter().try_for_each(|line| print(line))?;
             if matches!(&daemon.command, Command::Worker(args) if args.yield_to_owner.is_some()) {
-                print(&format!(
-                    "a service sees no keyboard and no mouse: to yield to whoever types, start a worker at logon"
-                ))?;
+                print(
+                    "a service sees no keyboard and no mouse: to yield to whoever types, start a worker at logon",
+                )?;
             }
             print(&format!("start it now: net start {name}"))?;
         }

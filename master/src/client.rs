@@ -292,7 +292,7 @@ pub fn submit(args: &SubmitArgs) -> Result<ExitCode, String> {
         print(&format!("{{\"job\":{job}}}"))?;
     } else {
         print(&format!("job {job} submitted"))?;
-        tell(&format!("{}", next(job, &args.at)));
+        tell(&next(job, &args.at).to_string());
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -136,14 +136,14 @@ fn tables(args: &SimulateArgs, cluster: &Cluster) -> Result<ExitCode, String> {
         .ok_or_else(|| format!("{}: no [tables]; add decks and hosts", args.cluster.display()))?;
     let models = [model(&tables.decks[0], args.cycles)?, model(&tables.decks[1], args.cycles)?];
     if !tables.rates.is_empty() {
-        let rows = sweep::run(cluster, tables, &models, &mut |cell| tell(&cell))?;
+        let rows = sweep::run(cluster, tables, &models, &mut |cell| tell(cell))?;
         if args.json {
             return print_rows(&rows);
         }
         print(&sweep::print(cluster, &rows))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let report = table::run(cluster, tables, &models, &mut |cell| tell(&cell))?;
+    let report = table::run(cluster, tables, &models, &mut |cell| tell(cell))?;
     if let Some(folder) = &args.out {
         pictures(folder, &cluster.title, &report.last)?;
         let path = folder.join("speed-up.svg");

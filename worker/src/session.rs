@@ -255,9 +255,7 @@ impl Session {
         if std::mem::take(&mut self.released) {
             actions.push(Action::Forget);
         }
-        if let Some(assign) = self.next.take() {
-            self.load(assign, actions);
-        }
+        self.next.take().into_iter().for_each(|assign| self.load(assign, actions));
     }
 
     /// Passes an assignment of this epoch, or pieces of it, if it may come now.
@@ -274,8 +272,8 @@ impl Session {
 
     /// Drops all of the job in hand; a task under way goes on, for nothing.
     fn clear(&mut self) {
-        let (busy, outdated, released) = (self.busy, self.busy || self.outdated, self.released);
-        *self = Self { busy, outdated, released, ..Self::new() };
+        let outdated = self.busy || self.outdated;
+        *self = Self { busy: self.busy, outdated, released: self.released, ..Self::new() };
     }
 
     /// Begins an epoch.
