@@ -265,18 +265,25 @@ pub fn gather_from(
     Ok(packed)
 }
 
-/// The bytes of a regular file that a deck may be, or refer to: no folder, no device and no pipe, which have no end, and no file that is
-/// larger than all of a deck may be.
+/// The bytes of a file that a deck refers to: of a regular one, as devices and pipes have no end.
 ///
 /// # Errors
 /// Why it cannot be read, and what to do.
 pub fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
+    if fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
+        return Err("this is no regular file; name one, as devices and pipes have no end".to_string());
+    }
+    bytes_of_deck(path)
+}
+
+/// The bytes of a deck, which may come through a pipe: no more than a deck may have.
+///
+/// # Errors
+/// Why it cannot be read, and what to do.
+pub fn bytes_of_deck(path: &Path) -> Result<Vec<u8>, String> {
     let about = fs::metadata(path).map_err(|e| e.to_string())?;
     if about.is_dir() {
         return Err("this is a folder; name a deck in it".to_string());
-    }
-    if !about.is_file() {
-        return Err("this is no regular file; name one, as devices and pipes have no end".to_string());
     }
     let too_large =
         |bytes: u64| format!("{bytes} bytes; a deck has at most {MAX_BYTES} with its includes, shorten it");
@@ -343,7 +350,11 @@ mod tests {
         let why = |path: &str| bytes_of(Path::new(path)).expect_err("it is no deck");
         assert!(why(env!("CARGO_MANIFEST_DIR")).contains("this is a folder"));
         #[cfg(unix)]
-        assert!(why("/dev/zero").contains("no regular file"));
+        {
+            assert!(why("/dev/zero").contains("no regular file"));
+            let endless = bytes_of_deck(Path::new("/dev/zero")).expect_err("it has no end");
+            assert!(endless.contains("bytes; a deck has at most"), "{endless}");
+        }
         assert!(bytes_of(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"))).is_ok());
         let told = text_of(b"title = \"x\"\n# gr\xfcn\n".to_vec());
         assert_eq!(told, Err("line 2 is no text in UTF-8; save the deck in UTF-8".to_string()));

@@ -61,15 +61,8 @@ pub fn doubt(model: &Model) {
 /// If the deck cannot be opened, or is too large.
 pub fn gather_deck(path: &Path, options: &Reading) -> Result<String, Error> {
     let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| Error::File { name: name.clone(), why: e.to_string() })?;
-    // Comments of keyword decks are written in all kinds of encodings.
-    let text = match String::from_utf8(bytes) {
-        Ok(text) => text,
-        Err(error) if error.as_bytes().iter().any(|b| matches!(b, b'*' | b'$')) => {
-            String::from_utf8_lossy(error.as_bytes()).into_owned()
-        }
-        Err(error) => return Err(Error::File { name, why: error.to_string() }),
-    };
+    let fault = |why| Error::File { name: name.clone(), why };
+    let text = bundle::bytes_of_deck(path).and_then(bundle::text_of).map_err(fault)?;
     let folder = folder_of(path);
     let mut open = |path: &str| {
         let (found, bytes) = read_in_any_case(path)?;
@@ -91,7 +84,7 @@ fn folder_of(deck: &Path) -> Option<PathBuf> {
 /// either: where no file has the name, the only one that differs from it in case is taken.
 fn read_in_any_case(path: &str) -> Option<(PathBuf, Vec<u8>)> {
     let path = Path::new(path);
-    if let Ok(bytes) = std::fs::read(path) {
+    if let Ok(bytes) = bundle::bytes_of(path) {
         return Some((path.to_owned(), bytes));
     }
     let wanted = path.file_name()?.to_str()?;
@@ -103,7 +96,7 @@ fn read_in_any_case(path: &str) -> Option<(PathBuf, Vec<u8>)> {
     let mut found = entries.flatten().filter(same);
     let only = found.next().filter(|_| found.next().is_none())?;
     let path = only.path();
-    std::fs::read(&path).ok().map(|bytes| (path, bytes))
+    bundle::bytes_of(&path).ok().map(|bytes| (path, bytes))
 }
 
 /// Why a deck cannot be used.
