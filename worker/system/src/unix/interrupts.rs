@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM.
+//! Ctrl-C, SIGTERM, and SIGHUP where it is heeded.
 
 use std::io;
 
@@ -8,6 +8,8 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 pub struct Interrupts {
     interrupt: Signal,
     term: Signal,
+    /// The terminal is gone; none where that is ignored, as `nohup` has it.
+    hangup: Option<Signal>,
 }
 
 impl Interrupts {
@@ -16,14 +18,60 @@ impl Interrupts {
     /// # Errors
     /// If the system refuses.
     pub fn listen() -> io::Result<Self> {
-        Ok(Self { interrupt: signal(SignalKind::interrupt())?, term: signal(SignalKind::terminate())? })
+        let hangup = (!ignores_hangup()).then(|| signal(SignalKind::hangup())).transpose()?;
+        Ok(Self {
+            interrupt: signal(SignalKind::interrupt())?,
+            term: signal(SignalKind::terminate())?,
+            hangup,
+        })
     }
 
     /// Waits for the next. Cancel safe: one that comes while nobody waits is given to the next call.
     pub async fn next(&mut self) {
+        let hangup = async {
+            match &mut self.hangup {
+                Some(hangup) => hangup.recv().await,
+                None => std::future::pending().await,
+            }
+        };
         tokio::select! {
             _ = self.interrupt.recv() => {}
             _ = self.term.recv() => {}
+            _ = hangup => {}
         }
+    }
+}
+
+/// Whether whoever started this process had it outlive its terminal.
+fn ignores_hangup() -> bool {
+    // SAFETY: all bytes zero are a value of this type, a plain struct of C.
+    let mut now: libc::sigaction = unsafe { std::mem::zeroed() };
+    // SAFETY: nothing is changed, since no new action is given, and `now` is there to be written to.
+    let asked = unsafe { libc::sigaction(libc::SIGHUP, std::ptr::null(), &raw mut now) };
+    asked == 0 && now.sa_sigaction == libc::SIG_IGN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn handle_hangup(how: libc::sighandler_t) {
+        // SAFETY: no handler is given, only the default or none.
+        unsafe { libc::signal(libc::SIGHUP, how) };
+    }
+
+    #[test]
+    fn a_terminal_that_is_closed_is_heeded_unless_that_is_ignored() {
+        handle_hangup(libc::SIG_IGN);
+        assert!(ignores_hangup());
+        handle_hangup(libc::SIG_DFL);
+        assert!(!ignores_hangup());
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+        runtime.block_on(async {
+            let mut interrupts = Interrupts::listen().expect("signals");
+            // SAFETY: this process has a handler for it now.
+            assert_eq!(unsafe { libc::raise(libc::SIGHUP) }, 0);
+            interrupts.next().await;
+        });
     }
 }
