@@ -65,7 +65,7 @@ fn standard_output_that_is_full_or_closed_ends_no_command_with_a_panic() {
         &["check", &small, "--json"],
         &["verify", &out, "--files"],
         &["export", &out, "--format", "vtkhdf"],
-        &["picture", &out, "--out", &picture],
+        &["picture", &out, "--field", "pressure", "--out", &picture],
         &["materials"],
         &["schema"],
         &["init"],

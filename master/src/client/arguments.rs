@@ -85,9 +85,6 @@ pub struct SubmitArgs {
     /// Follow the job until it ends, then print its summary
     #[arg(long)]
     pub wait: bool,
-    /// Whom to tell when it is over; with --wait
-    #[command(flatten, next_help_heading = "Whom to tell when it is over, with --wait")]
-    pub notify: NotifyArgs,
     /// Write trace.json into the results: what every worker did in its last cycles, for Perfetto
     #[arg(long, conflicts_with = "no_output")]
     pub trace: bool,
@@ -97,4 +94,8 @@ pub struct SubmitArgs {
     /// The master
     #[command(flatten)]
     pub at: ClientArgs,
+    // The last: its heading is that of all that follows.
+    /// Whom to tell when it is over; with --wait
+    #[command(flatten, next_help_heading = "Whom to tell when it is over, with --wait")]
+    pub notify: NotifyArgs,
 }
