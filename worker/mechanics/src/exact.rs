@@ -62,8 +62,9 @@ impl Quantum {
     /// This quantum for increments of this cycle.
     #[inline(always)]
     pub fn dithered(self, cycle: u64) -> Dithered {
-        let turns = cycle as f64 * 0.618_033_988_749_894_9;
-        Dithered { quantum: self, phase: turns - turns.floor() }
+        // Multiples of the golden ratio, their fractions: 2^64 are a turn.
+        let turned = cycle.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11;
+        Dithered { quantum: self, phase: turned as f64 / (1_u64 << 53) as f64 }
     }
 
     /// Largest magnitude a single term may have: `2^47 q`.
@@ -105,10 +106,11 @@ impl Dithered {
     #[inline(always)]
     pub(crate) fn round_lanes<L: Lane>(self, x: L) -> L {
         let q = self.quantum.value();
-        let chosen = x.mul_add(L::splat(LOW_BITS / q), L::splat(self.phase));
+        // Plain products and sums: outside of kernels a fused one is a call.
+        let chosen = x * L::splat(LOW_BITS / q) + L::splat(self.phase);
         let whole = rounded(chosen, L::splat(Quantum { q: 1.0 }.magic()));
         let dither = L::select(x.abs().less(L::splat(DITHERED * q)), chosen - whole, L::splat(0.0));
-        rounded(dither.mul_add(L::splat(q), x), L::splat(self.quantum.magic()))
+        rounded(x + dither * L::splat(q), L::splat(self.quantum.magic()))
     }
 }
 
