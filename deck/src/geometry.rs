@@ -8,6 +8,19 @@ pub(crate) const EDGES: [[usize; 2]; 12] =
 pub(crate) const FACES: [[usize; 4]; 6] =
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [2, 3, 7, 6], [1, 2, 6, 5], [0, 4, 7, 3]];
 
+/// What two elements at a face have in common: its nodes, each once, ascending, and `u32::MAX` behind them. None where an element that repeats
+/// corners has drawn the face to an edge.
+pub(crate) fn key_of_face(mut nodes: [u32; 4]) -> Option<[u32; 4]> {
+    nodes.sort_unstable();
+    for i in 1..4 {
+        if nodes[i] == nodes[i - 1] {
+            nodes[i - 1] = u32::MAX;
+        }
+    }
+    nodes.sort_unstable();
+    (nodes[2] != u32::MAX).then_some(nodes)
+}
+
 pub(crate) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

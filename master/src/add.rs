@@ -9,7 +9,10 @@ use std::{fmt::Write, process::ExitCode, process::Stdio, time::Duration};
 use serde::Serialize;
 use tokio::{io::AsyncWriteExt, process::Command, sync::Semaphore};
 
-use crate::{command::AddArgs, shell::print, shell::quoted};
+use crate::{
+    command::AddArgs,
+    shell::{print, quoted},
+};
 
 pub mod file;
 use file::{Host, Way};

@@ -3,7 +3,7 @@
 use mechanics::mesh::Topology;
 
 use super::assembly::Assembly;
-use crate::geometry::{FACES, norm, sub};
+use crate::geometry::{FACES, key_of_face, norm, sub};
 
 /// An outer face of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub(super) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
     for (p, part) in assembly.mesh.parts.iter().enumerate() {
         let first = keyed.len();
         let mut add = |element: usize, side: u8, nodes: [u32; 4]| {
-            let Some(key) = key_of(nodes) else { return };
+            let Some(key) = key_of_face(nodes) else { return };
             let element = (offsets[p] + element) as u32;
             keyed.push((key, order, Face { part: p as u32, element, side, nodes, inside: false }));
             order += 1;
@@ -75,19 +75,6 @@ pub(super) fn outer_faces(assembly: &Assembly) -> Vec<Face> {
     }
     keyed.sort_unstable_by_key(|(_, order, _)| *order);
     keyed.into_iter().map(|(_, _, face)| face).collect()
-}
-
-/// What two elements at a face have in common: its nodes, each once. None where an element that repeats corners has
-/// drawn the face to an edge.
-fn key_of(mut nodes: [u32; 4]) -> Option<[u32; 4]> {
-    nodes.sort_unstable();
-    for i in 1..4 {
-        if nodes[i] == nodes[i - 1] {
-            nodes[i - 1] = u32::MAX;
-        }
-    }
-    nodes.sort_unstable();
-    (nodes[2] != u32::MAX).then_some(nodes)
 }
 
 /// The index into [`mechanics::mesh::FACES`] of the face with these corners.

@@ -91,7 +91,7 @@ pub struct Dithered {
     phase: f64,
 }
 
-/// Quanta up to which an increment is dithered: more lose less than a thousandth by rounding.
+/// Quanta up to which an increment is dithered: more lose at most two thousandths by rounding.
 const DITHERED: f64 = 256.0;
 /// Low bits of an increment of one quantum that choose its dither.
 const LOW_BITS: f64 = (1_u64 << 40) as f64;

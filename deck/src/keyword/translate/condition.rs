@@ -6,7 +6,7 @@ use mechanics::load::{MAX_FORCES, Span};
 
 use super::{element::corners_of, moving::is_of_nozzle, state::Translation};
 use crate::{
-    geometry::{dot, sub, unit},
+    geometry::{dot, key_of_face, sub, unit},
     keyword::{
         condition::{AXES_OF_CODE, Driven, Meaning, Target, Way},
         problem::Problem,
@@ -311,7 +311,7 @@ impl Outward {
             let corners = corners_of(solid.nodes);
             for face in mechanics::mesh::FACES.map(|face| face.map(|c| corners[c])) {
                 // An element that repeats corners has drawn some of its faces to an edge.
-                let Some(key) = key_of(face) else { continue };
+                let Some(key) = key_of_face(face) else { continue };
                 // A face of two elements is inside, and no pressure acts there.
                 if outward.insert(key, face).is_some() {
                     outward.remove(&key);
@@ -319,7 +319,7 @@ impl Outward {
             }
         }
         for shell in problem.shells.iter().filter(|_| of_shells) {
-            if let Some(key) = key_of(shell.nodes) {
+            if let Some(key) = key_of_face(shell.nodes) {
                 outward.entry(key).or_insert(shell.nodes);
             }
         }
@@ -328,24 +328,12 @@ impl Outward {
 
     /// Whether the nodes of a segment stand around the outward normal of its face; none where it is no outer face.
     pub(super) fn is_outward(&self, segment: [u32; 4]) -> Option<bool> {
-        let face = self.0.get(&key_of(segment)?)?;
+        let face = self.0.get(&key_of_face(segment)?)?;
         let start = face.iter().position(|node| *node == segment[0])?;
         let next = (1..4).map(|i| face[(start + i) % 4]).find(|node| *node != segment[0]);
         let second = segment.into_iter().find(|node| *node != segment[0]);
         Some(next == second)
     }
-}
-
-/// The different nodes of a face, ascending; none of one that has less than three.
-fn key_of(mut face: [u32; 4]) -> Option<[u32; 4]> {
-    face.sort_unstable();
-    for i in 1..4 {
-        if face[i] == face[i - 1] {
-            face[i - 1] = u32::MAX;
-        }
-    }
-    face.sort_unstable();
-    (face[2] != u32::MAX).then_some(face)
 }
 
 /// Pressures, by whether segments are listed outward.
