@@ -5,10 +5,17 @@ use crate::{
     solve::{Solved, model, run},
 };
 
+/// Steps that show the closed form without the error of the scheme.
+const SHORT_STEPS: &str = "safety_factor = 0.03\n";
+
 /// A mass of 2 kg at (1, 0, 0) on a spring from the origin, whose other end is held; it begins with 3 m/s along the spring.
 fn on_spring(law: &str, end_time: f64, more: &str) -> Solved {
+    with_control(SHORT_STEPS, law, end_time, more)
+}
+
+fn with_control(control: &str, law: &str, end_time: f64, more: &str) -> Solved {
     run(model(&format!(
-        "title = \"a mass on a spring\"\nunits = \"SI\"\n[control]\nend_time = {end_time}\nsafety_factor = 0.01\n[output]\nhistory_cycles = 1\n\
+        "title = \"a mass on a spring\"\nunits = \"SI\"\n[control]\nend_time = {end_time}\n{control}[output]\nhistory_cycles = 1\n\
          [[part]]\nname = \"spring\"\nvelocity = [3, 0, 0]\nspring = {{ {law} }}\n\
          mesh = {{ nodes = [[1, 0, 0, 0], [2, 1, 0, 0]], elements = [[1, 1, 2]] }}\n\
          [[mass]]\nnodes = [1, 2]\nmass = 2\n[[boundary]]\ntype = \"fixed\"\nnodes = [1]\n\
@@ -29,6 +36,25 @@ fn passages(path: &[(f64, f64)], value: f64) -> Vec<f64> {
         .collect()
 }
 
+/// Twice the mean time between zeros.
+fn period(path: &[(f64, f64)]) -> f64 {
+    let zeros = passages(path, 0.0);
+    2.0 * (zeros[zeros.len() - 1] - zeros[0]) / (zeros.len() - 1) as f64
+}
+
+/// The logarithmic decrement over the first two periods. A parabola through three points finds each peak.
+fn decrement(path: &[(f64, f64)]) -> f64 {
+    let peaks: Vec<f64> = path
+        .windows(3)
+        .filter(|w| w[1].1 > w[0].1 && w[1].1 >= w[2].1)
+        .map(|w| {
+            let [a, b, c] = [w[0].1, w[1].1, w[2].1];
+            b + (c - a) * (c - a) / (8.0 * (2.0 * b - a - c))
+        })
+        .collect();
+    (peaks[0] / peaks[2]).ln() / 2.0
+}
+
 /// The greatest energy error of the history, over the energy of the mass.
 fn energy_error(solved: &Solved) -> f64 {
     let first = solved.rows[0].total;
@@ -38,27 +64,33 @@ fn energy_error(solved: &Solved) -> f64 {
 /// 8 kN/m and 2 kg.
 pub(super) fn a_mass_on_a_spring_swings_as_the_closed_form_says(figures: &mut Figures) {
     let solved = on_spring("stiffness = 8000", 1.0, "");
-    let path = path(&solved);
-    let zeros = passages(&path, 0.0);
-    let period = 2.0 * (zeros[zeros.len() - 1] - zeros[0]) / (zeros.len() - 1) as f64;
+    let measured = period(&path(&solved));
     // The leapfrog scheme is faster by w dt / 2 over the arc of its sine.
     let half = 0.5 * 4000_f64.sqrt() * solved.rows[solved.rows.len() - 2].dt;
-    figures.add("mass on a spring: period, without the error of the scheme (s)", period * half.asin() / half);
+    figures
+        .add("mass on a spring: period, without the error of the scheme (s)", measured * half.asin() / half);
     figures.add("mass on a spring: energy error", energy_error(&solved));
+    let solved = with_control("", "stiffness = 8000", 1.0, "");
+    figures.add("mass on a spring, default step: period (s)", period(&path(&solved)));
 }
 
 /// The same with a tenth of the critical damping, and a damper of 40 Ns/m alone.
 pub(super) fn a_damper_takes_the_energy_of_a_mass_as_the_closed_form_says(figures: &mut Figures) {
     let solved = on_spring("stiffness = 8000, damping = 25.298221281347036", 0.4, "");
-    let path = path(&solved);
-    let peaks: Vec<f64> =
-        path.windows(3).filter(|w| w[1].1 > w[0].1 && w[1].1 >= w[2].1).map(|w| w[1].1).collect();
-    figures.add("mass on a damped spring: logarithmic decrement", (peaks[0] / peaks[2]).ln() / 2.0);
+    figures.add("mass on a damped spring: logarithmic decrement", decrement(&path(&solved)));
     figures.add("mass on a damped spring: energy error", energy_error(&solved));
+    let solved = with_control("", "stiffness = 8000, damping = 25.298221281347036", 0.4, "");
+    figures.add("mass on a damped spring, default step: logarithmic decrement", decrement(&path(&solved)));
     let alone = on_spring("damping = 40", 1.0, "");
     let last = alone.rows.last().expect("rows");
     figures.add("mass on a damper alone: way to rest (m)", last.gauges[0].x[0] - 1.0);
     figures.add("mass on a damper alone: energy in the damper (J)", last.internal);
+    let alone = with_control("", "damping = 40", 0.1, "");
+    let last = alone.rows.last().expect("rows");
+    figures.add(
+        "mass on a damper alone, default step: way after two times m / c (m)",
+        last.gauges[0].x[0] - 1.0,
+    );
 }
 
 /// The end is driven out by 0.1 m and back to its place: the spring keeps the area of its loop.

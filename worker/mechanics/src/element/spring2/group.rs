@@ -2,7 +2,9 @@
 
 use std::mem::take;
 
-use super::{DAMPED, FORCE, N_OWN, PLASTIC, Plastic, SLIP, STIFF, Spring, norm, rate, stable_step};
+use super::{
+    DAMPED, FORCE, N_OWN, PLASTIC, Plastic, RATES, SLIP, STIFF, Spring, drawn_on, longest_step, norm, rate,
+};
 use crate::{
     element::{
         ElementVote, Fault, Step,
@@ -56,13 +58,16 @@ impl Springs {
         let [a, b] = self.bars[e].map(|n| n as usize);
         let along: [f64; 3] = std::array::from_fn(|axis| nodes.x[axis][b] - nodes.x[axis][a]);
         let apart: [f64; 3] = std::array::from_fn(|axis| nodes.v[axis][b] - nodes.v[axis][a]);
-        let before: [f64; 3] = std::array::from_fn(|axis| (-step.dt).mul_add(apart[axis], along[axis]));
-        let (length, length_before) = (norm(along), norm(before));
+        let along_before: [f64; 3] = std::array::from_fn(|axis| (-step.dt).mul_add(apart[axis], along[axis]));
+        let (length, length_before) = (norm(along), norm(along_before));
         let initial = self.initial_length[e];
         let elongation = length - initial + self.spring.offset;
         let mut plastic = Plastic { elongation: self.own[PLASTIC][e], slip: self.own[SLIP][e] };
         let elastic = self.spring.elastic.force(elongation, &mut plastic);
-        let force = elastic + self.spring.damper.force(rate(along, apart));
+        // The velocities are those of half a step ago.
+        let rate = rate(along, apart);
+        let before = RATES.map(|own| self.own[own][e]);
+        let force = elastic + self.spring.damper.force(drawn_on(rate, before));
         let mut energy = self.fields[field::ENERGY][e];
         if step.dt > 0.0 {
             let mean = 0.5 * (self.own[FORCE][e] + force);
@@ -83,11 +88,12 @@ impl Springs {
         let across = force.abs() / length;
         let stiffer =
             if across > self.stiffness && self.stiffness > 0.0 { across / self.stiffness } else { 1.0 };
-        let limit = stable_step(stiffer * self.own[STIFF][e], self.own[DAMPED][e]);
+        let limit = longest_step(stiffer * self.own[STIFF][e], self.own[DAMPED][e]);
         vote.offer_courant(limit, self.elements[e]);
         vote.internal += step.energy_quantum.round(energy * initial);
         if step.dt > 0.0 {
             self.own[FORCE][e] = force;
+            [self.own[RATES[0]][e], self.own[RATES[1]][e]] = [rate, before[0]];
             self.own[PLASTIC][e] = plastic.elongation;
             self.own[SLIP][e] = plastic.slip;
             self.fields[field::ENERGY][e] = energy;
