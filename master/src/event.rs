@@ -158,6 +158,8 @@ pub enum Limit {
     Contact,
     /// Solids will strike a rigid wall.
     Strike,
+    /// A rigid body may not turn further.
+    Turn,
     /// A contact node may not travel further.
     Travel,
     /// The step before times the growth.

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use mechanics::{
     exact::Quantum,
+    rigid::State,
     setup::{Control, Setup},
     vote::Vote,
     wall::{Motion, Pose},
@@ -23,6 +24,8 @@ const TRAVEL_PRESCRIBED: f64 = 0.19;
 const SQUEEZE: f64 = 5.0;
 /// Share of its volume that an element which strikes a wall may lose in a step, as votes on the rate of volume have it.
 const STRIKE_VOLUME: f64 = 0.1;
+/// Angle by which a rigid body may turn in a step: bodies of nodes alone have no element that would limit it.
+const TURN: f64 = 0.1;
 /// A step grows where its limits are longer than it by this factor. Limits follow the strains of elements, so a step that followed every
 /// rise of theirs would breathe with a body's vibration, two cycles late, and pump what nothing damps: shells.
 const ROOM_TO_GROW: f64 = 1.01;
@@ -292,6 +295,7 @@ pub(super) fn allowed(
     offer(setup.control.safety_factor * vote.courant, Limit::Courant, Some(vote.courant_element));
     offer(vote.volume_limit, Limit::Volume, None);
     offer(strike_limit(&setup.control, vote), Limit::Strike, None);
+    offer(turn_limit(&vote.bodies), Limit::Turn, None);
     let mut longest = offer(vote.contact_limit, Limit::Contact, None);
     if let (Some(contact), Some(touching)) = (&setup.contact, &problem.touching) {
         // A wall may bring a node to its own speed within a cycle.
@@ -324,6 +328,12 @@ fn strike_limit(control: &Control, vote: &Vote) -> f64 {
     let quadratic = control.quadratic_viscosity * control.quadratic_viscosity * vote.strike;
     let squeezed = SQUEEZE.mul_add(vote.strike, 1.0);
     (crossing / slower(linear + quadratic) / squeezed).min(STRIKE_VOLUME * crossing / vote.strike)
+}
+
+/// The step in which the fastest of some rigid bodies turns by [`TURN`]; infinite where none turns.
+fn turn_limit(bodies: &[State]) -> f64 {
+    let squared = |body: &State| body.spin.iter().map(|w| w * w).sum::<f64>();
+    TURN / bodies.iter().map(squared).fold(0.0, f64::max).sqrt()
 }
 
 /// The greatest speed of a wall: that prescribed at any time, or that of now.

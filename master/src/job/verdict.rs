@@ -179,6 +179,7 @@ impl Account {
             (Limit::Volume, _) => "the rate of volume of an element".to_owned(),
             (Limit::Contact, _) => "the stiffness of contacts or transmitting faces".to_owned(),
             (Limit::Strike, _) => "the speed at which solids will strike a rigid wall".to_owned(),
+            (Limit::Turn, _) => "the angular velocity of a rigid body".to_owned(),
             (Limit::Travel, _) => "the travel of contact nodes, a share of the gap".to_owned(),
             (Limit::Growth, _) => "the growth from the step before".to_owned(),
             (Limit::End, _) => return,

@@ -54,13 +54,14 @@ impl Constraint {
         if self.clamp_span.holds(time) { self.clamped } else { 0 }
     }
 
-    /// The velocity that is prescribed in the step `dt` around `middle` to a node at `x`, by axis.
+    /// The velocity that is prescribed in the step `dt` from `time` on to a node at `x`, by axis.
     ///
     /// # Panics
     /// If a curve is not there.
-    pub fn prescribed(&self, curves: &[Curve], x: [f64; 3], middle: f64, dt: f64) -> [Option<f64>; 3] {
-        let mut velocity = self.velocity.map(|drive| drive?.prescribed(curves, middle));
-        let turned = self.circle.and_then(|circle| Some((circle, circle.rate.prescribed(curves, middle)?)));
+    pub fn prescribed(&self, curves: &[Curve], x: [f64; 3], time: f64, dt: f64) -> [Option<f64>; 3] {
+        let of = |drive: Drive| drive.prescribed_for(curves, time, dt);
+        let mut velocity = self.velocity.map(|drive| of(drive?));
+        let turned = self.circle.and_then(|circle| Some((circle, of(circle.rate)?)));
         if let Some((circle, rate)) = turned {
             let along = circle.velocity(rate, x, dt);
             for axis in (0..3).filter(|&axis| axis != usize::from(circle.axis)) {

@@ -167,16 +167,22 @@ impl Domain {
         self.time = time;
     }
 
-    /// Adds the loads on faces to the forces of the blocks.
-    fn load_faces(&mut self, meter: &dyn Meter) {
+    /// Adds the loads on faces to the forces of the blocks; `dt` is `dt_{n-1}`.
+    fn load_faces(&mut self, dt: f64, meter: &dyn Meter) {
         if self.setup.loads.surfaces.is_empty() {
             return;
         }
         let Setup { loads, control, .. } = &self.setup;
         let (time, quantum) = (self.time, self.quanta.force);
         self.order.deal(&mut self.held_blocks, meter, |held_block| {
-            held_block.face_vote =
-                face::apply(&mut held_block.faces, &mut held_block.block, loads, control, time, quantum);
+            held_block.face_vote = face::apply(
+                &mut held_block.faces,
+                &mut held_block.block,
+                loads,
+                control,
+                (time, dt),
+                quantum,
+            );
         });
     }
 

@@ -1,6 +1,7 @@
 //! What acts on bodies from outside beside walls: curves of time, nodal forces, gravity, loads on faces, relaxation.
 //!
-//! Velocities are prescribed at the middle of a step, forces act at its start, as central differences have them. Forces
+//! Velocities are prescribed for a step, forces act at its start, as central differences have them; both are means over the time for
+//! which they stand, so that a pulse gives its impulse and a motion its way however long the steps are. Forces
 //! on nodes, gravity and relaxation are put in where nodes are integrated (`nodes.rs`), alike on every holder of a node;
 //! loads on faces are nodal forces of the block that has the element (`load/face.rs`), rounded like its corner forces.
 
@@ -49,6 +50,22 @@ impl Curve {
             from = point;
         }
         ((time - from[0]) * 0.5).mul_add(from[1] + self.at(time), sum)
+    }
+
+    /// The mean from a time on until a later one, exact for the straight lines.
+    pub fn mean(&self, from: f64, until: f64) -> f64 {
+        let first = self.points.partition_point(|p| p[0] <= from);
+        if self.points.get(first).is_none_or(|p| p[0] >= until) {
+            return self.at(0.5 * (from + until));
+        }
+        let (mut sum, mut last) = (0.0, [from, self.at(from)]);
+        let mut add = |[time, value]: [f64; 2]| {
+            sum += 0.5 * (time - last[0]) * (last[1] + value);
+            last = [time, value];
+        };
+        self.points[first..].iter().take_while(|p| p[0] < until).for_each(|&point| add(point));
+        add([until, self.at(until)]);
+        sum / (until - from)
     }
 
     /// The least and the greatest value from a time on until another.
@@ -126,12 +143,53 @@ impl Drive {
         self.curve.map_or(self.factor, |c| self.factor * curves[c as usize].at(time))
     }
 
+    /// The mean from a time on until another, with zeros for the times at which it does not act.
+    ///
+    /// # Panics
+    /// If there is no such curve.
+    pub fn mean(&self, curves: &[Curve], from: f64, until: f64) -> f64 {
+        if until <= from {
+            return self.at(curves, from);
+        }
+        let (begins, ends) = (from.max(self.span.from), until.min(self.span.until));
+        if ends <= begins {
+            return 0.0;
+        }
+        let mean = self.factor * self.curve.map_or(1.0, |c| curves[c as usize].mean(begins, ends));
+        if (begins, ends) == (from, until) { mean } else { mean * ((ends - begins) / (until - from)) }
+    }
+
+    /// The mean of a force that acts at a time, from the middle of the step before it to the middle of that after it.
+    ///
+    /// # Panics
+    /// If there is no such curve.
+    pub fn mean_around(&self, curves: &[Curve], time: f64, [before, after]: [f64; 2]) -> f64 {
+        self.mean(curves, (-0.5f64).mul_add(before, time), 0.5f64.mul_add(after, time))
+    }
+
     /// The value at a time at which it acts; none at others.
     ///
     /// # Panics
     /// If there is no such curve.
     pub fn prescribed(&self, curves: &[Curve], time: f64) -> Option<f64> {
         self.acts(time).then(|| self.at(curves, time))
+    }
+
+    /// The value for a step `dt` from a time on: where it acts in the middle, its mean over what the step has of its span. A span within the step
+    /// gives the whole step its way.
+    ///
+    /// # Panics
+    /// If there is no such curve.
+    pub fn prescribed_for(&self, curves: &[Curve], time: f64, dt: f64) -> Option<f64> {
+        let Span { from, until } = self.span;
+        let end = time + dt;
+        if time < from && from < until && until < end {
+            return Some(self.mean(curves, time, end));
+        }
+        let acts = self.acts(0.5f64.mul_add(dt, time));
+        acts.then(|| {
+            self.factor * self.curve.map_or(1.0, |c| curves[c as usize].mean(time.max(from), end.min(until)))
+        })
     }
 
     /// The least and the greatest value from a time on until another, of the times at which it acts; none if it acts at none.
@@ -304,6 +362,36 @@ mod tests {
             (constant.at(&[], 9.0), constant.integral(&[], 2.0), constant.greatest(&[])),
             (3.0, 6.0, 3.0)
         );
+    }
+
+    #[test]
+    fn a_mean_is_the_integral_over_the_time_however_many_points_lie_between() {
+        let curves = [Curve { points: vec![[1.0, 2.0], [3.0, 6.0], [4.0, -1.0]] }];
+        let drive = Drive { span: Span { from: 0.5, until: 3.5 }, ..Drive::along(0, 2.0) };
+        for (from, until) in
+            [(0.0, 0.4), (0.0, 1.0), (1.5, 2.0), (0.7, 3.2), (2.0, 9.0), (0.0, 9.0), (3.5, 4.0)]
+        {
+            let expected = (drive.integral(&curves, until) - drive.integral(&curves, from)) / (until - from);
+            let found = drive.mean(&curves, from, until);
+            assert!((found - expected).abs() < 1e-14, "{from} to {until}: {found}, expected {expected}");
+        }
+        assert_eq!(drive.mean(&curves, 2.0, 2.0), 8.0);
+        assert_eq!(Drive::constant(0.1).mean(&[], 0.3, 0.7), 0.1, "to the bit");
+    }
+
+    #[test]
+    fn what_is_prescribed_for_a_step_is_the_mean_of_what_the_step_has_of_its_span() {
+        let curves = [Curve { points: vec![[0.0, 0.0], [1.0, 4.0], [2.0, 0.0]] }];
+        let whole = Drive::along(0, 1.0);
+        // A triangle within a step, and one of which a step sees the half.
+        assert_eq!(whole.prescribed_for(&curves, 0.0, 4.0), Some(1.0));
+        assert_eq!(whole.prescribed_for(&curves, 1.0, 2.0), Some(1.0));
+        let spanned = Drive { span: Span { from: 1.0, until: 2.0 }, ..whole };
+        assert_eq!(
+            [(0.0, 1.5), (0.0, 2.0), (1.5, 2.0)].map(|(t, dt)| spanned.prescribed_for(&curves, t, dt)),
+            [None, Some(2.0), None]
+        );
+        assert_eq!(spanned.prescribed_for(&curves, 0.5, 2.0), Some(1.0), "within the step");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::{
     element::vector::Vector,
     exact::{Quanta, rounded},
     lanes::{Lane, SET, Width, dispatch::Task},
-    load::Loads,
+    load::{Drive, Loads},
     wall::{Pose, RigidWall, WallVote},
     work::{self, Work},
 };
@@ -139,7 +139,7 @@ impl Advance<'_> {
             return None;
         }
         let gain = self.loads.gravity.map_or([0.0; 3], |gravity| {
-            let scale = self.half_steps() * gravity.drive.at(&self.loads.curves, self.time);
+            let scale = self.half_steps() * self.mean(&gravity.drive);
             gravity.acceleration.map(|g| g * scale)
         });
         Some(Body { gain, loss })
@@ -148,6 +148,11 @@ impl Advance<'_> {
     /// From `t_{n-1/2}` to `t_{n+1/2}` (time).
     pub(crate) fn half_steps(&self) -> f64 {
         0.5 * (self.dt_previous + self.dt)
+    }
+
+    /// The mean of a load from `t_{n-1/2}` to `t_{n+1/2}`.
+    pub(crate) fn mean(&self, drive: &Drive) -> f64 {
+        drive.mean_around(&self.loads.curves, self.time, [self.dt_previous, self.dt])
     }
 
     /// Share of the velocity that relaxation takes in this step.

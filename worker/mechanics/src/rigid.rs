@@ -251,7 +251,8 @@ impl Advance<'_> {
     /// What a push, loads and the past make of a body.
     pub fn free(&self, body: &Body, push: &Push, state: &State) -> Free {
         let half_steps = self.half_steps();
-        let curves = &self.loads.curves;
+        let mean =
+            |drive: &Drive| drive.mean_around(&self.loads.curves, self.time, [self.dt_previous, self.dt]);
         let force_quantum = self.quanta.force.value();
         let torque_quantum = force_quantum * body.length.value();
         let pushed: [f64; 3] = std::array::from_fn(|a| {
@@ -269,16 +270,16 @@ impl Advance<'_> {
         };
         for &(node, load) in &body.forces {
             let load = &self.loads.forces[load as usize];
-            let scale = half_steps * load.drive.at(curves, self.time);
+            let scale = half_steps * mean(&load.drive);
             give(load.force.map(|f| f * scale), body.places[node as usize]);
         }
         for pull in &body.pulls {
             let load = &self.loads.forces[pull.load as usize];
-            let scale = half_steps * load.drive.at(curves, self.time) * pull.mass;
+            let scale = half_steps * mean(&load.drive) * pull.mass;
             give(load.force.map(|f| f * scale), pull.place);
         }
         if let Some(gravity) = self.loads.gravity {
-            let scale = half_steps * gravity.drive.at(curves, self.time);
+            let scale = half_steps * mean(&gravity.drive);
             (0..3).for_each(|a| velocity[a] += gravity.acceleration[a] * scale);
         }
         let loss = self.loads.loss(self.time, half_steps);
@@ -293,14 +294,14 @@ impl Advance<'_> {
 
     fn prescribed(&self, body: &Body, state: &State) -> Prescribed {
         let curves = &self.loads.curves;
-        let middle = 0.5 * self.dt + self.time;
-        let mut spin = body.spin.map(|drive| drive?.prescribed(curves, middle));
+        let of = |drive: Drive| drive.prescribed_for(curves, self.time, self.dt);
+        let mut spin = body.spin.map(|drive| of(drive?));
         let motion = Constraint { velocity: body.velocity, circle: body.circle, ..Constraint::default() };
         if let Some(Circle { axis, rate, .. }) = body.circle {
             let axis = usize::from(axis);
-            spin[axis] = rate.prescribed(curves, middle).or(spin[axis]);
+            spin[axis] = of(rate).or(spin[axis]);
         }
-        Prescribed { velocity: motion.prescribed(curves, state.centre, middle, self.dt), spin }
+        Prescribed { velocity: motion.prescribed(curves, state.centre, self.time, self.dt), spin }
     }
 
     /// Where a body is at `t_{n+1}` after joints gave it an impulse.

@@ -35,7 +35,7 @@ impl Domain {
     pub fn prepare(&mut self, meter: &dyn Meter) -> Vote {
         self.vote = Vote::empty(self.n_parts);
         self.elements(Sets::All, 0.0, meter);
-        self.load_faces(meter);
+        self.load_faces(0.0, meter);
         for held_block in &mut self.held_blocks {
             held_block.block.clear_forces();
             let v = &held_block.block.v;

@@ -167,7 +167,7 @@ impl Domain {
                 self.vote.add_contacts(&held.contact.pair_votes());
             }
         }
-        self.load_faces(meter);
+        self.load_faces(dt, meter);
     }
 
     fn compute_contact(&mut self, dt: f64, cycle: u64, meter: &dyn Meter) {

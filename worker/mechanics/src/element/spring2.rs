@@ -318,7 +318,7 @@ pub(crate) fn start(mesh: &Mesh, state: &mut GlobalState) -> Result<(), String> 
             state.own[FORCE][at] = force + spring.damper.force(rate);
             state.own[STIFF][at] = of_ends(0);
             state.own[DAMPED][at] = of_ends(1);
-            RATES.map(|before| state.own[before][at] = rate);
+            RATES.iter().for_each(|&before| state.own[before][at] = rate);
             state.elements[field::ENERGY][at] =
                 spring.elastic.stored(spring.offset) / state.initial_volume[at];
         }

@@ -3,7 +3,7 @@
 //! A face is the bilinear surface through its corners; what acts on it goes to the corners by their shape functions. A
 //! uniform pressure on all faces of an element is then exactly its pressure times the volume gradient.
 
-use super::{Loads, SurfaceKind, moving::Moment};
+use super::{Drive, Loads, SurfaceKind, moving::Moment};
 use crate::{
     block::Block,
     element::hex8,
@@ -93,18 +93,21 @@ fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Adds the loads at `time` to the forces of the block, and keeps them for [`work`].
+/// Adds the loads at `time` to the forces of the block, and keeps them for [`work`]. A pressure is its mean over a step `dt` around that time: the
+/// last one, because nobody knows the next before the forces are known.
 pub(crate) fn apply(
     faces: &mut [LoadedFace],
     block: &mut Block,
     loads: &Loads,
     control: &Control,
-    time: f64,
+    (time, dt): (f64, f64),
     quantum: Quantum,
 ) -> FaceVote {
+    let mean = |drive: Drive| drive.mean_around(&loads.curves, time, [dt; 2]);
     let mut vote = FaceVote { force_bound: 0.0, limit: f64::INFINITY };
     let damping = 8.0 * block.hourglass.damping() + 2.0 * control.linear_viscosity;
-    let moments: Vec<Moment<'_>> = loads.moving.iter().map(|load| load.at(&loads.curves, time)).collect();
+    let moments: Vec<Moment<'_>> =
+        loads.moving.iter().map(|load| load.at(&loads.curves, mean(load.pressure), time)).collect();
     for face in faces {
         let nodes = face.nodes;
         let at = |values: &[Vec<f64>; 3], n: usize| [values[0][n], values[1][n], values[2][n]];
@@ -133,7 +136,7 @@ pub(crate) fn apply(
             let (area, v) = (areas[corner], velocities[corner]);
             let force = match kind {
                 SurfaceKind::Pressure(drive) => {
-                    let tension = -drive.at(&loads.curves, time);
+                    let tension = -mean(drive);
                     area.map(|c| c * tension)
                 }
                 SurfaceKind::Blast(_) => area.map(|c| c * -blast),

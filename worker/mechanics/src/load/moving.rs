@@ -66,11 +66,11 @@ impl MovingPressure {
         self.pressure.greatest(curves) * self.profile.map_or(1.0, |c| curves[c as usize].greatest())
     }
 
-    /// What it is at a time.
-    pub(super) fn at<'l>(&'l self, curves: &'l [Curve], time: f64) -> Moment<'l> {
+    /// What it is at a time, with this [pressure](Self::pressure).
+    pub(super) fn at<'l>(&'l self, curves: &'l [Curve], pressure: f64, time: f64) -> Moment<'l> {
         Moment {
             load: self,
-            pressure: self.pressure.at(curves, time),
+            pressure,
             profile: self.profile.map(|c| &curves[c as usize]),
             centre: self.path.at(curves, time),
             points: Rule::Gauss(self.points).points().unwrap_or_default(),
@@ -177,7 +177,7 @@ mod tests {
         let x = [[0.0, 0.0, 0.1], [1.0, 0.1, 0.0], [1.3, 1.2, 0.2], [-0.1, 0.9, 0.0]];
         for points in 2..=5 {
             let load = MovingPressure { points, ..jet(way()) };
-            let forces = load.at(&[], 0.5).forces(&x);
+            let forces = load.at(&[], 3.0, 0.5).forces(&x);
             for (force, area) in forces.iter().zip(super::super::face::corner_areas(x)) {
                 assert!((0..3).all(|a| (force[a] + 3.0 * area[a]).abs() < 1e-15), "{points}: {forces:?}");
             }
@@ -190,7 +190,7 @@ mod tests {
         let curves = [Curve { points: vec![[0.0, 1.0], [1.0, 0.0]] }];
         let load = MovingPressure { profile: Some(0), radius: 1.0, ..jet(way()) };
         for time in [1.0, 2.7, 3.3] {
-            let moment = load.at(&curves, time);
+            let moment = load.at(&curves, 3.0, time);
             let mut sum = [0.0; 3];
             let side = 0.05;
             for i in -40..180 {

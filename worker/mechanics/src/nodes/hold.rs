@@ -111,7 +111,7 @@ impl Advance<'_> {
             while forces != 0 {
                 let load = &self.loads.forces[forces.trailing_zeros() as usize];
                 let inertia = if load.by_mass { 1.0 } else { mass };
-                let scale = half_steps * load.drive.at(curves, self.time) / inertia;
+                let scale = half_steps * self.mean(&load.drive) / inertia;
                 for a in 0..3 {
                     new[a] += load.force[a] * scale;
                 }
@@ -121,7 +121,7 @@ impl Advance<'_> {
             // Neighbours have the same velocities, as long as no circle has them depend on the place.
             let prescribed = match same {
                 Some((of, velocities)) if of == constraint => velocities,
-                _ => held.prescribed(curves, x, 0.5f64.mul_add(self.dt, self.time), self.dt),
+                _ => held.prescribed(curves, x, self.time, self.dt),
             };
             same = held.circle.is_none().then_some((constraint, prescribed));
             for axis in 0..3 {
