@@ -475,13 +475,14 @@ pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> 
     let folder = out.unwrap_or_else(|| Path::new("results").join(format!("job-{job}")));
     let mut client = Client::new(at)?;
     let Reply::Files(files) = client.ask(&Request::Files { job })? else { return Err(surprise()) };
-    Folder::create(&folder, force).map_err(|e| e.to_string())?;
+    let taken = Folder::create(&folder, force).map_err(|e| e.to_string())?;
     let mut total = 0;
     for (name, _) in &files {
         // The master is believed no more than any other peer.
         check_file_name(name)?;
         total += client.fetch(job, name, &folder.join(name))?;
     }
+    drop(taken);
     if at.json {
         let names: Vec<&String> = files.iter().map(|(name, _)| name).collect();
         print(&serde_json::to_string(&names).map_err(|e| e.to_string())?)?;

@@ -168,21 +168,34 @@ impl Folder {
     /// With `force` a folder that is not empty is taken too, and the files that a run writes, left there by an
     /// earlier run, are removed first. Other files stay.
     ///
+    /// No other run can take the folder while this value or a clone of it lives.
+    ///
     /// # Errors
-    /// [`Error::NotEmpty`] without `force`; [`Error::Io`] if the folder cannot be created, listed or cleared.
+    /// [`Error::NotEmpty`] without `force`; [`Error::Taken`] if another run has it; [`Error::Io`] if the folder cannot be created, listed or
+    /// cleared.
     pub fn create(path: &Path, force: bool) -> Result<Self, Error> {
-        let folder = Self::prepare(path, force)?;
+        let folder = Self::claim(path, force)?;
         folder.clear()?;
         Ok(folder)
     }
 
-    /// The same for a run that may still fail to begin: what is in the folder stays until [`Folder::clear`], and no other run can claim the
-    /// folder while this value or a clone of it lives.
+    /// The same for a run that may still fail to begin: what is in the folder stays until [`Folder::clear`].
     ///
     /// # Errors
     /// [`Error::NotEmpty`] without `force`; [`Error::Taken`] if another run has it; [`Error::Io`] if it cannot be created or listed.
     pub fn claim(path: &Path, force: bool) -> Result<Self, Error> {
-        let folder = Self::prepare(path, force)?;
+        fs::create_dir_all(path).map_err(Error::io("create", path))?;
+        for entry in fs::read_dir(path).map_err(Error::io("read", path))? {
+            let name = entry.map_err(Error::io("read", path))?.file_name();
+            if !force && name != LOCK {
+                return Err(Error::NotEmpty { path: path.to_owned() });
+            }
+        }
+        Self::take(path)
+    }
+
+    /// Takes a folder for as long as the value lives.
+    fn take(path: &Path) -> Result<Self, Error> {
         let lock = match system::folders::lock(path) {
             Ok(Some(lock)) => Some(Arc::new(lock)),
             Ok(None) => return Err(Error::Taken { path: path.to_owned() }),
@@ -191,19 +204,7 @@ impl Folder {
                 None
             }
         };
-        Ok(Self { _lock: lock, ..folder })
-    }
-
-    /// Creates the folder, with its parents, or takes one that is empty or may be written over.
-    fn prepare(path: &Path, force: bool) -> Result<Self, Error> {
-        fs::create_dir_all(path).map_err(Error::io("create", path))?;
-        for entry in fs::read_dir(path).map_err(Error::io("read", path))? {
-            let name = entry.map_err(Error::io("read", path))?.file_name();
-            if !force && name != LOCK {
-                return Err(Error::NotEmpty { path: path.to_owned() });
-            }
-        }
-        Ok(Self { path: path.to_owned(), _lock: None })
+        Ok(Self { path: path.to_owned(), _lock: lock })
     }
 
     /// Removes the files that a run writes. Other files stay.
@@ -223,10 +224,10 @@ impl Folder {
     /// Takes a folder as an earlier session of the same run left it, to go on writing.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be listed.
+    /// [`Error::Taken`] if another run has it; [`Error::Io`] if it cannot be listed.
     pub fn reopen(path: &Path) -> Result<Self, Error> {
         fs::read_dir(path).map_err(Error::io("read", path))?;
-        Ok(Self { path: path.to_owned(), _lock: None })
+        Self::take(path)
     }
 
     /// BLAKE3 of the files of a state.

@@ -60,7 +60,7 @@ fn jobs_are_listed_and_every_refusal_is_json_with_an_error() {
         ("POST", "/api/jobs?cykles=5", 400, "unknown field `cykles`"),
         ("GET", "/api/jobs/7/history?column=3", 400, "unknown field `column`"),
         ("GET", "/api/jobs/7/surface/0?cutt=x", 400, "unknown field `cutt`"),
-        ("POST", "/api/jobs?min_workers=0", 422, "min-workers 0"),
+        ("POST", "/api/jobs?min_workers=0", 422, "min_workers 0"),
         ("POST", "/api/jobs?min_workers=99999999", 422, "min-workers"),
     ] {
         let (found, answer) = page.ask(method, path, &deck);

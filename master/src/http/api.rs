@@ -270,7 +270,7 @@ async fn submit(
         ..JobOptions::default()
     };
     if options.min_workers == 0 {
-        let why = "min-workers 0: expected a number from 1 to 10000; leave it out for 1";
+        let why = "min_workers 0: expected a number from 1 to 10000; leave it out for 1";
         return Err(Fault(StatusCode::UNPROCESSABLE_ENTITY, json!({ "error": why })));
     }
     options.check().map_err(desk::Error::Options)?;

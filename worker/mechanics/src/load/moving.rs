@@ -143,6 +143,11 @@ impl Moment<'_> {
 mod tests {
     use super::*;
 
+    /// A load whose pressure is that of a time.
+    fn moment<'l>(load: &'l MovingPressure, curves: &'l [Curve], time: f64) -> Moment<'l> {
+        load.at(curves, load.pressure.at(curves, time), time)
+    }
+
     fn jet(path: Path) -> MovingPressure {
         MovingPressure {
             pressure: Drive::constant(3.0),
@@ -177,7 +182,7 @@ mod tests {
         let x = [[0.0, 0.0, 0.1], [1.0, 0.1, 0.0], [1.3, 1.2, 0.2], [-0.1, 0.9, 0.0]];
         for points in 2..=5 {
             let load = MovingPressure { points, ..jet(way()) };
-            let forces = load.at(&[], 3.0, 0.5).forces(&x);
+            let forces = moment(&load, &[], 0.5).forces(&x);
             for (force, area) in forces.iter().zip(super::super::face::corner_areas(x)) {
                 assert!((0..3).all(|a| (force[a] + 3.0 * area[a]).abs() < 1e-15), "{points}: {forces:?}");
             }
@@ -190,7 +195,7 @@ mod tests {
         let curves = [Curve { points: vec![[0.0, 1.0], [1.0, 0.0]] }];
         let load = MovingPressure { profile: Some(0), radius: 1.0, ..jet(way()) };
         for time in [1.0, 2.7, 3.3] {
-            let moment = load.at(&curves, 3.0, time);
+            let moment = moment(&load, &curves, time);
             let mut sum = [0.0; 3];
             let side = 0.05;
             for i in -40..180 {
@@ -210,11 +215,11 @@ mod tests {
     fn beyond_the_radius_and_before_it_acts_nothing_is_pressed() {
         let x = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let near = MovingPressure { radius: 0.1, ..jet(way()) };
-        assert_eq!(near.at(&[], 4.0).forces(&x), [[0.0; 3]; 4]);
+        assert_eq!(moment(&near, &[], 4.0).forces(&x), [[0.0; 3]; 4]);
         let wide = MovingPressure { radius: 1.0, ..jet(way()) };
-        assert!(wide.at(&[], 1.0).forces(&x)[0][2] < 0.0);
+        assert!(moment(&wide, &[], 1.0).forces(&x)[0][2] < 0.0);
         let mut late = wide;
         late.pressure.span.from = 2.0;
-        assert_eq!(late.at(&[], 1.0).forces(&x), [[0.0; 3]; 4]);
+        assert_eq!(moment(&late, &[], 1.0).forces(&x), [[0.0; 3]; 4]);
     }
 }

@@ -16,5 +16,6 @@ pub fn raise_limit(wanted: u64) -> u64 {
     limit.current.unwrap_or(wanted)
 }
 
-/// Errors of the system that say that it has none left of something: memory (12), files (23, 24), room on a disk (28, 122).
-pub const SHORTAGES: &[i32] = &[12, 23, 24, 28, 122];
+/// Errors of the system that say that it has none left of something, or no disk to write to until somebody helps: memory (12), files
+/// (23, 24), room on a disk (28, 122), a disk that fails, was made read-only for that, or is that of a server which is away (5, 30, 116).
+pub const SHORTAGES: &[i32] = &[5, 12, 23, 24, 28, 30, 116, 122];

@@ -8,7 +8,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 pub struct Interrupts {
     interrupt: Signal,
     term: Signal,
-    /// The terminal is gone; none where that is ignored, as `nohup` has it.
+    /// The terminal is gone; none where that is ignored, as `nohup` has it, and after the first request.
     hangup: Option<Signal>,
 }
 
@@ -27,6 +27,9 @@ impl Interrupts {
     }
 
     /// Waits for the next. Cancel safe: one that comes while nobody waits is given to the next call.
+    ///
+    /// A terminal that is closed is a request only if it is the first: a shell hangs up its jobs and then has the system do so once more,
+    /// so what would be the second request is no haste of anybody's.
     pub async fn next(&mut self) {
         let hangup = async {
             match &mut self.hangup {
@@ -39,6 +42,7 @@ impl Interrupts {
             _ = self.term.recv() => {}
             _ = hangup => {}
         }
+        self.hangup = None;
     }
 }
 
@@ -71,6 +75,13 @@ mod tests {
             let mut interrupts = Interrupts::listen().expect("signals");
             // SAFETY: this process has a handler for it now.
             assert_eq!(unsafe { libc::raise(libc::SIGHUP) }, 0);
+            interrupts.next().await;
+            // SAFETY: as before.
+            assert_eq!(unsafe { libc::raise(libc::SIGHUP) }, 0);
+            let again = tokio::time::timeout(std::time::Duration::from_millis(200), interrupts.next()).await;
+            assert!(again.is_err(), "the second of a closed terminal is no request");
+            // SAFETY: as before, since it is listened for.
+            assert_eq!(unsafe { libc::raise(libc::SIGTERM) }, 0);
             interrupts.next().await;
         });
     }
