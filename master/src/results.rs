@@ -60,7 +60,7 @@ use tracing::warn;
 use crate::disk::sync_folder;
 
 /// What the lock of a folder leaves there on Windows.
-const LOCK: &str = "locked";
+pub const LOCK: &str = "locked";
 
 /// Why results could not be written or read.
 #[derive(Debug)]

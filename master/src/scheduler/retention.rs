@@ -80,7 +80,9 @@ fn remove_results(folder: &Path) -> Result<(), results::Error> {
     if folder.is_symlink() || !folder.is_dir() {
         return Ok(());
     }
-    results::Folder::create(folder, true)?;
+    drop(results::Folder::create(folder, true)?);
+    // Where the lock is a file, it stays.
+    let _ = fs::remove_file(folder.join(results::LOCK));
     match fs::remove_dir(folder) {
         // Somebody's files stay.
         Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => Ok(()),
