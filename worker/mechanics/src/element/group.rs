@@ -230,7 +230,7 @@ pub(crate) trait Group: Send + Sync {
 
     /// Energy that the element of a slot takes of its nodes in the second half of the step `dt` to the positions `x` of now, with the
     /// velocities `v`, by the forces that it had before the step. A shell gives none: all its layers have broken, and what its hourglass
-    /// control still holds is left out.
+    /// control still holds is left out, as is what damps it.
     fn half_work(&self, _slot: usize, _moved: [&[Vec<f64>; 3]; 2], _dt: f64, _material: &Material) -> f64 {
         0.0
     }

@@ -2,6 +2,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "tests compare with the platform's functions")]
 
+mod damping;
 mod laminate;
 mod plane;
 

@@ -14,12 +14,18 @@ use crate::{
 };
 
 /// State of an element beside its layers: hourglass forces of membrane x and y, bending about x and y, deflection and
-/// twist; thickness; internal energy; hourglass energy.
-pub const ELEMENT: usize = 9;
+/// twist; thickness; internal energy; hourglass energy; the viscous part of the sums of its section and of its hourglass forces.
+pub const ELEMENT: usize = VISCOUS + SUMS + HOURGLASS_FORCES;
 /// Index of the thickness in the state of an element.
 pub const THICKNESS: usize = 6;
 pub(crate) const INTERNAL: usize = 7;
 pub(crate) const HOURGLASS: usize = 8;
+/// The first number of the viscous part. It is kept because that of the step before works until `t_n`: with what the rates of now give alone,
+/// the heat of a swing of frequency `w` would be `2 / (1 + cos(w dt))` times as much as the swing loses.
+const VISCOUS: usize = 9;
+/// Sums of the stress of a section.
+const SUMS: usize = 8;
+const HOURGLASS_FORCES: usize = 6;
 
 /// Shear correction of a homogeneous plate.
 pub(crate) const SHEAR: f64 = 5.0 / 6.0;
@@ -170,9 +176,9 @@ unsafe fn slots<L: Lane, W: Layers, const P: usize>(
     let lane = slot % SET;
     let n_numbers = (ELEMENT + P * (W::SHARED + c.points.len() * W::BY_LAYER)) * SET;
     let (own, of_layers) = view.state[slot / SET * n_numbers..][..n_numbers].split_at_mut(ELEMENT * SET);
-    let mut state = [zero; ELEMENT];
+    let mut state = [zero; VISCOUS];
     let mut i = 0;
-    while i < ELEMENT {
+    while i < VISCOUS {
         // SAFETY: slots are inside.
         state[i] = unsafe { L::load(own, i * SET + lane) };
         i += 1;
@@ -235,7 +241,9 @@ unsafe fn slots<L: Lane, W: Layers, const P: usize>(
     // SAFETY: slots are inside.
     let answer =
         unsafe { plane::update::<L, W, P>(of_layers, c, (lane, alive), (h, lag), &strains, &patterns, &g) };
-    let (power, damped) = (answer.power, answer.damped);
+    let power = answer.power;
+    // SAFETY: slots are inside.
+    let damped = half * unsafe { both_viscous(own, lane, alive, &answer.viscous) }.power(&strains);
     // Strain across the thickness: its elastic part by Hooke, its plastic part keeps the volume.
     let thinning =
         L::splat((1.0 - 2.0 * poisson) / young).mul_add(answer.rise, -(dt * (membrane[0] + membrane[1])));
@@ -256,10 +264,19 @@ unsafe fn slots<L: Lane, W: Layers, const P: usize>(
     ];
     let share = answer.elastic.max(L::splat(SOFT));
     let (mut hourglass_power, mut hourglass_damped) = (zero, zero);
-    let mut resisting = [zero; 6];
+    let mut resisting = [zero; HOURGLASS_FORCES];
     // Those that points in the plane see are no hourglass.
-    let mut pattern = if P == 1 { 0 } else { PATTERNS };
-    while pattern < 6 {
+    let seen = if P == 1 { 0 } else { PATTERNS };
+    let mut pattern = 0;
+    while pattern < seen {
+        // SAFETY: slots are inside.
+        let both = unsafe {
+            with_last(own, VISCOUS + SUMS + pattern, lane, alive, answer.viscous_on_patterns[pattern])
+        };
+        hourglass_damped = (half * both).mul_add(rates[pattern], hourglass_damped);
+        pattern += 1;
+    }
+    while pattern < HOURGLASS_FORCES {
         let (old, rate) = (state[pattern], rates[pattern]);
         let rise = stiffness[pattern] * rate;
         // A force falls by the whole stiffness, as it would else give back more than it has taken; what it rises by is soft.
@@ -267,7 +284,9 @@ unsafe fn slots<L: Lane, W: Layers, const P: usize>(
         let fallen = old.min(whole).max(old.max(whole).min(zero));
         let new = share.mul_add(whole - fallen, fallen);
         hourglass_power = (half * (new + old)).mul_add(rate, hourglass_power);
-        hourglass_damped = (lag * rise).mul_add(rate, hourglass_damped);
+        // SAFETY: slots are inside.
+        let both = unsafe { with_last(own, VISCOUS + SUMS + pattern, lane, alive, lag * rise) };
+        hourglass_damped = (half * both).mul_add(rate, hourglass_damped);
         state[pattern] = new;
         resisting[pattern] = lag.mul_add(rise, new);
         pattern += 1;
@@ -382,7 +401,7 @@ unsafe fn slots<L: Lane, W: Layers, const P: usize>(
         scatter(&mut view.m, view.corners, slot, &moments);
     }
     let mut i = 0;
-    while i < ELEMENT {
+    while i < VISCOUS {
         // SAFETY: slots are inside.
         unsafe {
             let old = L::load(own, i * SET + lane);
@@ -416,6 +435,49 @@ unsafe fn slots<L: Lane, W: Layers, const P: usize>(
         }
         lane += 1;
     }
+}
+
+/// Leaves a number of the viscous part for the next step; gives the sum of this and of that before.
+///
+/// # Safety
+/// `own` holds the numbers of a set, and the lanes from `lane` on are inside the set.
+#[inline(always)]
+unsafe fn with_last<L: Lane>(own: &mut [f64], number: usize, lane: usize, alive: L::Mask, new: L) -> L {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let last = L::load(own, number * SET + lane);
+        L::select(alive, new, last).store(own, number * SET + lane);
+        last + new
+    }
+}
+
+/// Likewise of all sums of the section.
+///
+/// # Safety
+/// As [`with_last`].
+#[inline(always)]
+unsafe fn both_viscous<L: Lane>(
+    own: &mut [f64],
+    lane: usize,
+    alive: L::Mask,
+    new: &Resultants<L>,
+) -> Resultants<L> {
+    let mut both = *new;
+    let mut i = 0;
+    while i < 3 {
+        // SAFETY: the caller's promise.
+        unsafe {
+            both.n[i] = with_last(own, VISCOUS + i, lane, alive, new.n[i]);
+            both.m[i] = with_last(own, VISCOUS + 3 + i, lane, alive, new.m[i]);
+        }
+        i += 1;
+    }
+    // SAFETY: as above.
+    unsafe {
+        both.q[0] = with_last(own, VISCOUS + 6, lane, alive, new.q[0]);
+        both.q[1] = with_last(own, VISCOUS + 7, lane, alive, new.q[1]);
+    }
+    both
 }
 
 /// Components of a vector of each corner along the axes.

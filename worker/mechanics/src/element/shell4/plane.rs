@@ -33,6 +33,22 @@ struct Point<L> {
     hy: L,
 }
 
+impl<L: Lane> Point<L> {
+    /// Adds what the stress at this point gives the patterns, over the thickness.
+    #[inline(always)]
+    fn press(&self, stress: &Resultants<L>, across: L, on: &mut [L; PATTERNS]) {
+        let Self { hx, hy, .. } = *self;
+        let Resultants { n: [n_xx, n_yy, _], m: [m_xx, m_yy, _], .. } = *stress;
+        let [x, y, about_x, about_y] = *on;
+        *on = [
+            hx.mul_add(across.neg_mul_add(n_yy, n_xx), x),
+            hy.mul_add(across.neg_mul_add(n_xx, n_yy), y),
+            hy.neg_mul_add(across.neg_mul_add(m_xx, m_yy), about_x),
+            hx.mul_add(across.neg_mul_add(m_yy, m_xx), about_y),
+        ];
+    }
+}
+
 /// The points of an element in one configuration.
 struct Points<L> {
     /// `dx/dxi`, `dy/dxi`, `dx/deta`, `dy/deta` in the middle.
@@ -77,9 +93,12 @@ impl<L: Lane> Points<L> {
 pub(super) struct Answer<L, const P: usize> {
     /// By point the sums of the stress after the step, with the viscous part.
     after: [Resultants<L>; P],
-    /// Power of the stress, and of its viscous part, over the volume.
+    /// Power of the stress without its viscous part, over the volume.
     pub power: L,
-    pub damped: L,
+    /// The viscous part of the sums of the whole section, and of the forces on the patterns that the points see, on the geometry in the middle of
+    /// the step.
+    pub viscous: Resultants<L>,
+    pub viscous_on_patterns: [L; PATTERNS],
     /// By what `n_xx + n_yy` rises in the step.
     pub rise: L,
     /// Share of the section that is elastic.
@@ -111,18 +130,13 @@ impl<L: Lane, const P: usize> Answer<L, P> {
     pub fn on_patterns(&self, g: &Geometry<L>, h: L, poisson: f64) -> [L; PATTERNS] {
         let points = Points::of(g);
         let across = L::splat(poisson);
-        let [mut x, mut y, mut about_x, mut about_y] = [L::splat(0.0); PATTERNS];
+        let mut by_thickness = [L::splat(0.0); PATTERNS];
         let mut p = 0;
         while p < P {
-            let Point { hx, hy, .. } = points.at(p);
-            let Resultants { n: [n_xx, n_yy, _], m: [m_xx, m_yy, _], .. } = self.after[p];
-            x = hx.mul_add(across.neg_mul_add(n_yy, n_xx), x);
-            y = hy.mul_add(across.neg_mul_add(n_xx, n_yy), y);
-            about_x = hy.neg_mul_add(across.neg_mul_add(m_xx, m_yy), about_x);
-            about_y = hx.mul_add(across.neg_mul_add(m_yy, m_xx), about_y);
+            points.at(p).press(&self.after[p], across, &mut by_thickness);
             p += 1;
         }
-        [h * x, h * y, h * about_x, h * about_y]
+        times(h, &by_thickness)
     }
 }
 
@@ -142,11 +156,17 @@ pub(super) fn largest<L: Lane>(g: &Geometry<L>, of_gradients: L) -> L {
     of_gradients.max(L::splat(0.25) * g.inverse_area * g.inverse_area * sum)
 }
 
+/// Each of them times a factor.
+#[inline(always)]
+fn times<L: Lane>(factor: L, of: &[L; PATTERNS]) -> [L; PATTERNS] {
+    [factor * of[0], factor * of[1], factor * of[2], factor * of[3]]
+}
+
 /// What the section at one point gives: as [`Answer`].
 struct OfPoint<L> {
     after: Resultants<L>,
     power: L,
-    damped: L,
+    viscous: Resultants<L>,
     rise: L,
     elastic: L,
 }
@@ -168,14 +188,21 @@ pub(super) unsafe fn update<L: Lane, W: Layers, const P: usize>(
 ) -> Answer<L, P> {
     if P == 1 {
         // SAFETY: handed on from the caller.
-        let OfPoint { after, power, damped, rise, elastic } =
+        let OfPoint { after, power, viscous, rise, elastic } =
             unsafe { at_point::<L, W>(layers, c, lanes, lengths, strains) };
-        return Answer { after: [after; P], power, damped, rise, elastic };
+        let viscous_on_patterns = [L::splat(0.0); PATTERNS];
+        return Answer { after: [after; P], power, viscous, viscous_on_patterns, rise, elastic };
     }
     let zero = L::splat(0.0);
     let [_, poisson, _] = c.law.moduli();
-    let mut answer =
-        Answer { after: [Resultants::none(); P], power: zero, damped: zero, rise: zero, elastic: zero };
+    let mut answer = Answer {
+        after: [Resultants::none(); P],
+        power: zero,
+        viscous: Resultants::none(),
+        viscous_on_patterns: [zero; PATTERNS],
+        rise: zero,
+        elastic: zero,
+    };
     let points = Points::of(g);
     let n_numbers = (W::SHARED + c.points.len() * W::BY_LAYER) * SET;
     let mut p = 0;
@@ -187,11 +214,13 @@ pub(super) unsafe fn update<L: Lane, W: Layers, const P: usize>(
         let of_point = unsafe { at_point::<L, W>(of_point, c, lanes, lengths, &strains) };
         answer.after[p] = of_point.after;
         answer.power = at.share.mul_add(of_point.power, answer.power);
-        answer.damped = at.share.mul_add(of_point.damped, answer.damped);
+        answer.viscous.add_share(at.share, &of_point.viscous);
+        at.press(&of_point.viscous, L::splat(poisson), &mut answer.viscous_on_patterns);
         answer.rise = at.share.mul_add(of_point.rise, answer.rise);
         answer.elastic = at.share.mul_add(of_point.elastic, answer.elastic);
         p += 1;
     }
+    answer.viscous_on_patterns = times(lengths.0, &answer.viscous_on_patterns);
     answer
 }
 
@@ -226,7 +255,7 @@ unsafe fn at_point<L: Lane, W: Layers>(
     };
     OfPoint {
         power: L::splat(0.5) * before.plus(&after).power(strains),
-        damped: viscous.power(strains),
+        viscous,
         rise: (after.n[0] - before.n[0]) + (after.n[1] - before.n[1]),
         after: after.plus(&viscous),
         elastic,
