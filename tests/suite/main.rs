@@ -30,6 +30,7 @@ mod tearing;
 mod tetrahedra;
 mod triangles;
 mod trusses;
+mod turning;
 
 /// A row that nobody computes would look like one that holds.
 #[test]

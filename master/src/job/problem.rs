@@ -59,7 +59,7 @@ impl Problem {
 fn begin(model: &Model, constraint: &[u16]) -> Result<(GlobalState, Quanta, Option<Touching>), Error> {
     let (mesh, setup) = (&model.mesh, &model.setup);
     let mut start = initial::state(mesh, setup, &model.velocity, constraint).map_err(Error::Problem)?;
-    initial::spin(&mut start, &setup.constraints, &model.spin);
+    initial::spin(&mut start, setup, &model.spin);
     initial::axes(&mut start, mesh, &setup.materials, &model.axes).map_err(Error::Problem)?;
     initial::scatter(&mut start, mesh, &model.scatter);
     initial::stress(&mut start, mesh, setup, &model.stress).map_err(Error::Problem)?;

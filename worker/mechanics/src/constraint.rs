@@ -22,7 +22,7 @@ pub struct Constraint {
     pub clamped: u8,
     /// When it does not.
     pub clamp_span: Span,
-    /// A circle that the node follows, which leaves it free along the axis.
+    /// A circle that the node follows, which leaves it free along the axis. A node of shells or beams turns with it.
     pub circle: Option<Circle>,
     /// By axis the number of the support that prescribes the velocity, from 1; 0 is none whose force is wanted.
     pub supports: [u8; 3],
@@ -49,9 +49,22 @@ impl Constraint {
         self.forces == 0 && self.velocity.iter().all(Option::is_none) && self.circle.is_none()
     }
 
-    /// The axes about which a node of shells does not turn at a time.
-    pub fn clamped_at(&self, time: f64) -> u8 {
-        if self.clamp_span.holds(time) { self.clamped } else { 0 }
+    /// The rotation rate that is prescribed to a node of shells or beams at a time, by axis: none about those that are clamped, and about the
+    /// axis of a circle that of the circle.
+    ///
+    /// # Panics
+    /// If a curve is not there.
+    pub fn spin(&self, curves: &[Curve], time: f64) -> [Option<f64>; 3] {
+        let mut spin = [None; 3];
+        if let Some(circle) = self.circle {
+            spin[usize::from(circle.axis)] = circle.rate.prescribed(curves, time);
+        }
+        if self.clamp_span.holds(time) {
+            for axis in (0..3).filter(|axis| self.clamped >> axis & 1 == 1) {
+                spin[axis] = Some(0.0);
+            }
+        }
+        spin
     }
 
     /// The velocity that is prescribed in the step `dt` from `time` on to a node at `x`, by axis.

@@ -209,13 +209,14 @@ pub fn scatter(state: &mut GlobalState, mesh: &Mesh, given: &[Scatter]) {
     }
 }
 
-/// Gives nodes of shells and beams their rotation rates at the start, about the axes about which they may turn; `given` is by node,
-/// or empty.
-pub fn spin(state: &mut GlobalState, constraints: &[Constraint], given: &[[f64; 3]]) {
-    for (n, (spin, given)) in state.shells.spin.iter_mut().zip(given).enumerate() {
-        let clamped = constraints[state.constraint[n] as usize].clamped_at(0.0);
+/// Gives nodes of shells and beams their rotation rates at the start: those that are prescribed, and else what is given by node, or none
+/// where `given` is empty.
+pub fn spin(state: &mut GlobalState, setup: &Setup, given: &[[f64; 3]]) {
+    for (n, spin) in state.shells.spin.iter_mut().enumerate() {
         if state.shells.inertia[n] > 0.0 {
-            *spin = std::array::from_fn(|axis| if clamped >> axis & 1 == 1 { 0.0 } else { given[axis] });
+            let given = given.get(n).copied().unwrap_or_default();
+            let held = setup.constraints[usize::from(state.constraint[n])].spin(&setup.loads.curves, 0.0);
+            *spin = std::array::from_fn(|axis| held[axis].unwrap_or(given[axis]));
         }
     }
 }

@@ -43,8 +43,8 @@ impl Turning {
 }
 
 /// Advances the rotation rates of the nodes of a block and clears the moments; gives the kinetic energy of rotation
-/// `sum 1/2 I w_{n-1/2} . w_{n+1/2}` of the booked nodes, and the work that relaxation does on them. What clamps a
-/// node does no work: it does not turn. The result does not depend on `width`.
+/// `sum 1/2 I w_{n-1/2} . w_{n+1/2}` of the booked nodes, and the work that relaxation and what prescribes their rates do on them. What
+/// clamps a node that does not turn does none. The result does not depend on `width`.
 ///
 /// # Panics
 /// If an array is shorter than the sets or the machine lacks the width.
@@ -70,11 +70,18 @@ struct Turn<'a, 'n> {
     sets: &'a [NodeSet],
 }
 
+/// Nodes of a set whose rates are prescribed: by axis a bit for each, and how fast they turn.
+#[derive(Clone, Copy)]
+struct Held {
+    nodes: [u8; 3],
+    rates: [[f64; SET]; 3],
+}
+
 /// Sums over the booked nodes of each lane.
 #[derive(Clone, Copy)]
 struct Sums<L> {
     kinetic: L,
-    /// Work of relaxation before and after `t_n`.
+    /// Work from outside before and after `t_n`.
     work: [L; 2],
 }
 
@@ -88,12 +95,11 @@ impl Task for Turn<'_, '_> {
         let mut sums = Sums { kinetic: zero, work: [zero; 2] };
         for index in 0..self.sets.len() {
             let set = self.sets[index];
-            let clamped = if set.held == 0 { [0; 3] } else { self.clamped(index, set.held) };
+            let held = if set.held == 0 { None } else { self.held(index, set.held) };
             let mut lane = 0;
             while lane < SET {
-                let held = [clamped[0] >> lane, clamped[1] >> lane, clamped[2] >> lane];
                 // SAFETY: the arrays hold all sets, as [`advance`] has found.
-                unsafe { self.lanes(index * SET + lane, set.booked >> lane, held, loss, &mut sums) };
+                unsafe { self.lanes(index * SET, lane, set.booked, held.as_ref(), loss, &mut sums) };
                 lane += L::N;
             }
         }
@@ -104,33 +110,35 @@ impl Task for Turn<'_, '_> {
 }
 
 impl Turn<'_, '_> {
-    /// The nodes of a set that do not turn about each axis.
-    fn clamped(&self, index: usize, held: u8) -> [u8; 3] {
+    /// What is prescribed to nodes of a set with constraints, if anything is.
+    fn held(&self, index: usize, constrained: u8) -> Option<Held> {
         let middle = 0.5f64.mul_add(self.advance.dt, self.advance.time);
-        let mut by_axis = [0; 3];
-        for lane in (0..SET).filter(|lane| held >> lane & 1 == 1) {
-            let constraint = self.constraint[index * SET + lane];
-            let clamped = self.advance.constraints[constraint as usize].clamped_at(middle);
-            for (axis, nodes) in by_axis.iter_mut().enumerate() {
-                *nodes |= (clamped >> axis & 1) << lane;
+        let mut held = Held { nodes: [0; 3], rates: [[0.0; SET]; 3] };
+        for lane in (0..SET).filter(|lane| constrained >> lane & 1 == 1) {
+            let constraint = &self.advance.constraints[usize::from(self.constraint[index * SET + lane])];
+            for (axis, rate) in constraint.spin(&self.advance.loads.curves, middle).into_iter().enumerate() {
+                held.nodes[axis] |= u8::from(rate.is_some()) << lane;
+                held.rates[axis][lane] = rate.unwrap_or(0.0);
             }
         }
-        by_axis
+        (held.nodes != [0; 3]).then_some(held)
     }
 
-    /// The nodes `at..at + N`.
+    /// The nodes `first + lane..first + lane + N` of the set that begins at `first`.
     ///
     /// # Safety
     /// The arrays hold them.
     #[inline(always)]
     unsafe fn lanes<L: Lane>(
         &mut self,
-        at: usize,
+        first: usize,
+        lane: usize,
         booked: u8,
-        clamped: [u8; 3],
+        held: Option<&Held>,
         loss: f64,
         sums: &mut Sums<L>,
     ) {
+        let at = first + lane;
         let (zero, half, energy) =
             (L::splat(0.0), L::splat(0.5), L::splat(self.advance.quanta.energy.magic()));
         let half_steps = L::splat(0.5 * (self.advance.dt_previous + self.advance.dt));
@@ -145,13 +153,22 @@ impl Turn<'_, '_> {
             // SAFETY: the caller's promise.
             let (old, moment) = unsafe { (L::load(w, at), L::load(m, at)) };
             let mut new = moment.mul_add(scale, old);
+            let mut change = zero;
             if loss > 0.0 {
-                let change = L::splat(-loss) * old;
+                change = L::splat(-loss) * old;
                 new = new + change;
+            }
+            if let Some(held) = held {
+                let free = new;
+                // SAFETY: a set has these lanes.
+                let rates = unsafe { L::load(&held.rates[axis], lane) };
+                new = L::select(L::mask(u32::from(held.nodes[axis] >> lane)), rates, free);
+                change = change + (new - free);
+            }
+            if loss > 0.0 || held.is_some() {
                 before = before + change * old;
                 after = after + change * new;
             }
-            new = L::select(L::mask(u32::from(clamped[axis])), zero, new);
             // SAFETY: as above.
             unsafe {
                 new.store(w, at);
@@ -160,10 +177,10 @@ impl Turn<'_, '_> {
             product = old.mul_add((new - old).mul_add(L::splat(2.0 * share), old), product);
             axis += 1;
         }
-        let booked = L::mask(u32::from(booked));
+        let booked = L::mask(u32::from(booked >> lane));
         let kinetic = rounded(half * inertia * product, energy);
         sums.kinetic = sums.kinetic + L::select(booked, kinetic, zero);
-        if loss > 0.0 {
+        if loss > 0.0 || held.is_some() {
             let quantum = self.advance.quanta.energy.dithered(self.advance.cycle);
             for (sum, half) in
                 sums.work.iter_mut().zip(work::halves([inertia * before, inertia * after], share))
@@ -178,9 +195,9 @@ impl Turn<'_, '_> {
 mod tests {
     use super::*;
     use crate::{
-        constraint::Constraint,
+        constraint::{Circle, Constraint},
         exact::{Quanta, Quantum},
-        load::{Loads, Relaxation},
+        load::{Drive, Loads, Relaxation},
     };
 
     #[test]
@@ -189,10 +206,16 @@ mod tests {
         let spin: Vec<[f64; 3]> = (0..n).map(|i| [0.3, -1.7, 2.9].map(|a| a * f64::from(i + 1))).collect();
         let moment = |axis: usize, node: usize| (1.0 + axis as f64) * (7.0 - node as f64);
         let inertia: Vec<f64> = (1..=n).map(|i| 0.01 * f64::from(i)).collect();
-        let constraint: Vec<u16> = (0..n).map(|i| u16::from(i % 5 == 2)).collect();
+        let constraint: Vec<u16> = (0..n).map(|i| [0, 0, 1, 0, 2][i as usize % 5]).collect();
         let mut sets = NodeSet::all(&constraint);
         sets.iter_mut().for_each(|set| set.booked = 0b0101_1011);
-        let constraints = [Constraint::default(), Constraint { clamped: 0b101, ..Constraint::default() }];
+        let circle = Circle { axis: 1, point: [0.0; 3], rate: Drive::constant(-4.5) };
+        let constraints = [
+            Constraint::default(),
+            Constraint { clamped: 0b101, ..Constraint::default() },
+            Constraint { clamped: 0b001, circle: Some(circle), ..Constraint::default() },
+        ];
+        let held = [[None; 3], [Some(0.0), None, Some(0.0)], [Some(0.0), Some(-4.5), None]];
         let quantum = Quantum::for_reference(1e3, 42);
         for factor in [None, Some(0.9)] {
             let relaxation = factor.map(|factor| Relaxation { factor, rate: 0.0, until: 1.0 });
@@ -223,13 +246,13 @@ mod tests {
                 let booked = 0b0101_1011 >> (node % SET) & 1 == 1;
                 for axis in 0..3 {
                     let old = spin[node][axis];
-                    let free = kept * old + moment(axis, node) / inertia[node] * 2e-4;
-                    let new = if constraint[node] == 1 && axis != 1 { 0.0 } else { free };
+                    let pushed = moment(axis, node) / inertia[node] * 2e-4;
+                    let new = held[usize::from(constraint[node])][axis].unwrap_or(kept * old + pushed);
                     assert!((w[axis][node] - new).abs() < 1e-12 * (1.0 + new.abs()), "{node} {axis}");
                     if booked {
                         // A quarter of the time between the velocities lies before `t_n`.
                         energy += 0.5 * inertia[node] * old * (0.5 * old + 0.5 * new);
-                        done += 0.5 * inertia[node] * (kept - 1.0) * old * (old + free);
+                        done += 0.5 * inertia[node] * (new - old - pushed) * (old + new);
                     }
                 }
             }
