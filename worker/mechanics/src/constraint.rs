@@ -49,17 +49,17 @@ impl Constraint {
         self.forces == 0 && self.velocity.iter().all(Option::is_none) && self.circle.is_none()
     }
 
-    /// The rotation rate that is prescribed to a node of shells or beams at a time, by axis: none about those that are clamped, and about the
-    /// axis of a circle that of the circle.
+    /// The rotation rate that is prescribed to a node of shells or beams in the step `dt` from `time` on, by axis: zero about those that are
+    /// clamped in its middle, and about the axis of a circle that of the circle.
     ///
     /// # Panics
     /// If a curve is not there.
-    pub fn spin(&self, curves: &[Curve], time: f64) -> [Option<f64>; 3] {
+    pub fn spin(&self, curves: &[Curve], time: f64, dt: f64) -> [Option<f64>; 3] {
         let mut spin = [None; 3];
         if let Some(circle) = self.circle {
-            spin[usize::from(circle.axis)] = circle.rate.prescribed(curves, time);
+            spin[usize::from(circle.axis)] = circle.rate.prescribed_for(curves, time, dt);
         }
-        if self.clamp_span.holds(time) {
+        if self.clamp_span.holds(0.5f64.mul_add(dt, time)) {
             for axis in (0..3).filter(|axis| self.clamped >> axis & 1 == 1) {
                 spin[axis] = Some(0.0);
             }

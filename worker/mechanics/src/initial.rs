@@ -215,7 +215,8 @@ pub fn spin(state: &mut GlobalState, setup: &Setup, given: &[[f64; 3]]) {
     for (n, spin) in state.shells.spin.iter_mut().enumerate() {
         if state.shells.inertia[n] > 0.0 {
             let given = given.get(n).copied().unwrap_or_default();
-            let held = setup.constraints[usize::from(state.constraint[n])].spin(&setup.loads.curves, 0.0);
+            let held =
+                setup.constraints[usize::from(state.constraint[n])].spin(&setup.loads.curves, 0.0, 0.0);
             *spin = std::array::from_fn(|axis| held[axis].unwrap_or(given[axis]));
         }
     }

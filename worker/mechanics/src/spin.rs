@@ -112,11 +112,11 @@ impl Task for Turn<'_, '_> {
 impl Turn<'_, '_> {
     /// What is prescribed to nodes of a set with constraints, if anything is.
     fn held(&self, index: usize, constrained: u8) -> Option<Held> {
-        let middle = 0.5f64.mul_add(self.advance.dt, self.advance.time);
+        let Advance { time, dt, loads, .. } = *self.advance;
         let mut held = Held { nodes: [0; 3], rates: [[0.0; SET]; 3] };
         for lane in (0..SET).filter(|lane| constrained >> lane & 1 == 1) {
             let constraint = &self.advance.constraints[usize::from(self.constraint[index * SET + lane])];
-            for (axis, rate) in constraint.spin(&self.advance.loads.curves, middle).into_iter().enumerate() {
+            for (axis, rate) in constraint.spin(&loads.curves, time, dt).into_iter().enumerate() {
                 held.nodes[axis] |= u8::from(rate.is_some()) << lane;
                 held.rates[axis][lane] = rate.unwrap_or(0.0);
             }
