@@ -297,18 +297,27 @@ pub fn conclude(
 ) -> Result<ExitCode, String> {
     let summary = summarise(model, census, outcome, traffic, threads, wall_s);
     let origin = Origin::of(&output.deck);
-    let summary = Summary { input: output.input.clone(), origin, ..summary };
-    for warning in &summary.warnings {
-        warn!("{warning}");
-    }
+    let mut summary = Summary { input: output.input.clone(), origin, ..summary };
+    let mut missing = Vec::new();
     if let Some(folder) = &output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
+        // A format that cannot be written takes nothing from what was computed.
+        for written in formats::write_each(folder.path(), &model.output.formats) {
+            match written {
+                Ok(written) => info!("{}", export::line(&written)),
+                Err(why) => missing.push(why),
+            }
+        }
+        if !missing.is_empty() {
+            summary.warnings.extend(missing.iter().cloned());
+            summary.write(folder).map_err(|e| e.to_string())?;
+        }
         let pictures = picture::of_report(folder.path(), &summary);
         report::write(folder, &summary, &model.units, &pictures).map_err(|e| e.to_string())?;
-        for written in formats::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
-            info!("{}", export::line(&written));
-        }
         output.seal()?;
+    }
+    for warning in &summary.warnings {
+        warn!("{warning}");
     }
     let mut text = match json {
         true => serde_json::to_string(&summary).map_err(|e| e.to_string())?,
@@ -322,6 +331,7 @@ pub fn conclude(
         (Some(reason), _) => Err(reason.clone()),
         _ if printed.is_err() => printed.map(|()| ExitCode::SUCCESS),
         (None, true) => Ok(ExitCode::from(130)),
+        (None, false) if !missing.is_empty() => Err("the run is complete, and so are its other results, but a format that was asked for is missing; bolide export writes it later".to_owned()),
         (None, false) => Ok(ExitCode::SUCCESS),
     }
 }

@@ -235,23 +235,31 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     }
     let threads = specs.iter().map(|spec| spec.threads).sum();
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
-    let summary =
+    let mut summary =
         Summary { input: reporter.output.input.clone(), origin: Origin::of(&order.name), ..summary };
-    for warning in &summary.warnings {
-        warn!(job = order.number, "{warning}");
-    }
     if let Some(folder) = &reporter.output.folder {
         summary.write(folder).map_err(|e| e.to_string())?;
+        let before = summary.warnings.len();
+        // A format that cannot be written takes nothing from what was computed.
+        for written in formats::write_each(folder.path(), &model.output.formats) {
+            match written {
+                Ok(written) => info!(job = order.number, "{}", export::line(&written)),
+                Err(why) => summary.warnings.push(why),
+            }
+        }
+        if summary.warnings.len() > before {
+            summary.write(folder).map_err(|e| e.to_string())?;
+        }
         let pictures = picture::of_report(folder.path(), &summary);
         report::write(folder, &summary, &model.units, &pictures).map_err(|e| e.to_string())?;
-        for written in formats::write_all(folder.path(), &model.output.formats).map_err(|e| e.to_string())? {
-            info!(job = order.number, "{}", export::line(&written));
-        }
         if order.options.trace {
             trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
                 .map_err(|e| e.to_string())?;
         }
         reporter.output.seal()?;
+    }
+    for warning in &summary.warnings {
+        warn!(job = order.number, "{warning}");
     }
     order.status.send_modify(|status| {
         status.cycle = summary.cycles;

@@ -1,7 +1,12 @@
 //! What a run says when it is over: the verdict on its quality, where it comes from, pictures in its report, and how it changes with the
 //! mesh.
 
-use std::{fs, path::Path, process::Command};
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+    time::Duration,
+};
 
 use master::{
     quality::Grade,
@@ -102,4 +107,48 @@ fn a_refined_run_is_compared_with_the_deck_as_it_is() {
         .output();
     let wrong = String::from_utf8_lossy(&wrong.expect("bolide runs").stderr).into_owned();
     assert!(wrong.contains("--measure \"lost(x)\""), "{wrong}");
+}
+
+#[test]
+fn tetrahedra_of_ten_nodes_are_solids_of_their_corners_in_d3plot() {
+    let folder = tempfile::tempdir().expect("room");
+    let mesh = "bolide mesh 1\nnodes 10\n1 0 0 0\n2 10 0 0\n3 0 10 0\n4 0 0 10\n5 5 0 0\n6 5 5 0\n7 0 5 0\n8 0 0 5\n9 5 0 5\n10 0 5 5\n\
+        solids 1 \"tet\"\n1 1 2 3 4 5 6 7 8 9 10\n";
+    fs::write(folder.path().join("tet.mesh"), mesh).expect("room");
+    let deck = "title = \"tet\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = 0.001\n[output]\nformats = [\"d3plot\"]\n\
+        [[part]]\nname = \"tet\"\nmaterial = \"STEEL_1006\"\nvelocity = [0, 0, -50]\nmesh = { file = \"tet.mesh\" }\n";
+    run(folder.path(), deck, &[]);
+    let bytes = fs::read(folder.path().join("results/bar/d3plot")).expect("the format that was asked for");
+    let word = |index: usize| i32::from_le_bytes(bytes[4 * index..4 * index + 4].try_into().expect("a word"));
+    // Nodes, solids, shells; behind the control words and the positions are the corners and the part.
+    assert_eq!([16, 23, 31].map(word), [10, 1, 0]);
+    assert_eq!([0, 1, 2, 3, 4, 5, 6, 7, 8].map(|i| word(64 + 30 + i)), [1, 2, 3, 3, 4, 4, 4, 4, 1]);
+}
+
+#[test]
+fn a_format_that_cannot_be_written_takes_nothing_from_the_run() {
+    let folder = tempfile::tempdir().expect("room");
+    let deck = BAR.replace("end_time = 0.01", "end_time = 0.02");
+    fs::write(folder.path().join("bar.toml"), deck).expect("room");
+    let results = folder.path().join("results/bar");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bolide"));
+    command.current_dir(folder.path()).args(["run", "bar.toml", "--format", "vtkhdf,d3plot"]);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let child = command.spawn().expect("bolide runs");
+    // Once the run writes, something stands where one of the formats goes.
+    while !results.join("input.deck").exists() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    fs::create_dir_all(results.join(".results.vtkhdf.tmp/full")).expect("room");
+    let done = child.wait_with_output().expect("it ends");
+    let [told, warned] = [done.stdout, done.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    assert_eq!(done.status.code(), Some(1), "{told}{warned}");
+    assert!(told.contains("digest") || told.contains("results in"), "{told}");
+    assert!(warned.contains("format vtkhdf is missing, it cannot be written: "), "{warned}");
+    assert!(warned.contains("bolide export writes it later"), "{warned}");
+    let whole = summary(&results);
+    assert!(!whole.digest.is_empty() && whole.warnings.iter().any(|words| words.contains("vtkhdf")));
+    for name in ["d3plot", "checksums.json", REPORT] {
+        assert!(results.join(name).is_file(), "{name}");
+    }
 }

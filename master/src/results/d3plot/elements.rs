@@ -11,7 +11,7 @@ pub(super) struct OfKind {
 
 /// The elements of the first state, in which none has eroded.
 pub(super) struct Elements {
-    /// Corners of each cell, indices of points.
+    /// Corners of each cell, indices of points; of tetrahedra those of the hexahedra that they are in the file.
     pub(super) corners: Vec<Vec<u32>>,
     /// Part of each cell, from 0, and the number of the element in the deck.
     pub(super) keys: Vec<(u32, u32)>,
@@ -45,9 +45,14 @@ impl Elements {
             trusses: OfKind::default(),
             shells: OfKind::default(),
         };
-        for (cell, corners) in elements.corners.iter().enumerate() {
+        for (cell, corners) in elements.corners.iter_mut().enumerate() {
             let kind = match corners.len() {
                 8 => &mut elements.solids,
+                // Solids of the format have eight corners: one of ten nodes is drawn without those amid its edges.
+                10 => {
+                    *corners = [0, 1, 2, 2, 3, 3, 3, 3].map(|node| corners[node]).to_vec();
+                    &mut elements.solids
+                }
                 4 => &mut elements.shells,
                 2 => &mut elements.trusses,
                 other => return Err(states.malformed(0, format!("a cell of {other} corners"))),
