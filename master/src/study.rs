@@ -84,6 +84,7 @@ fn compute_all(args: &StudyArgs) -> Result<ExitCode, String> {
     write(&out, &study, &outcomes)?;
     print(&study, &outcomes, args.json)?;
     let failed = outcomes.values().filter(|outcome| matches!(outcome, Outcome::Failed(_))).count();
+    warn_of_short_runs(&study, &outcomes);
     if !args.json {
         shell::print(&format!(
             "{} runs: {} computed, {} element-cycles; {} answered from the cache; {failed} failed\nresults in {}",
@@ -106,6 +107,22 @@ fn compute_all(args: &StudyArgs) -> Result<ExitCode, String> {
         ));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Of runs that ended before it was clear whether a gauge perforates.
+fn warn_of_short_runs(study: &Study, outcomes: &Outcomes) {
+    let is_short = |outcome: &&Outcome| matches!(outcome, Outcome::Done(row) if row.still_moving.iter().any(Option::is_some));
+    let mut short = outcomes.iter().filter(|(_, outcome)| is_short(outcome)).map(|(point, _)| point);
+    if let Some(point) = short.next() {
+        let at = course::words(study, &point.values, None);
+        let more = match short.count() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        tell(&format!(
+            "warning: at {at}{more} nothing is perforated, but the gauge still moves forward at the end: the run may be too short to tell; give the deck a later end_time"
+        ));
+    }
 }
 
 /// Reads and checks a study.

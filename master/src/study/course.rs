@@ -28,6 +28,8 @@ use crate::{
 
 /// Faults of a deck that are printed at most.
 const MOST_FAULTS: usize = 100;
+/// Warnings of decks that are printed at most.
+const MOST_WARNINGS: usize = 30;
 
 /// What a study has cost so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -109,8 +111,30 @@ impl<'a> Course<'a> {
                 lines.join("\n")
             ));
         }
-        let facts = self.ready.values().next().map(|prepared| prepared.facts.clone());
-        facts.map_or(Ok(()), |facts| check_measures(self.study, &facts))
+        check_measures(self.study, &self.ready)?;
+        self.warn();
+        Ok(())
+    }
+
+    /// Tells what is doubtful in the decks, each warning once, with a point that has it where others have not.
+    fn warn(&self) {
+        let mut warnings: BTreeMap<&str, (usize, &Point)> = BTreeMap::new();
+        for (point, prepared) in &self.ready {
+            for warning in &prepared.warnings {
+                warnings.entry(warning).or_insert((0, point)).0 += 1;
+            }
+        }
+        for (warning, (count, point)) in warnings.iter().take(MOST_WARNINGS) {
+            let at = words(self.study, &point.values, None);
+            match count {
+                count if *count == self.ready.len() => tell(&format!("warning: {warning}")),
+                1 => tell(&format!("warning: {warning} (at {at})")),
+                count => tell(&format!("warning: {warning} (at {at} and {} more)", count - 1)),
+            }
+        }
+        if let Some(more) = warnings.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
+            tell(&format!("and {more} warnings more, which bolide check tells of each point"));
+        }
     }
 
     /// Prints the points that are known so far with their identities.
@@ -253,9 +277,14 @@ impl<'a> Course<'a> {
         let sample = if point.sample > 0 { format!(", sample {}", point.sample) } else { String::new() };
         let told = match &outcome {
             Outcome::Done(row) => {
-                let values = self.study.measures.iter().zip(&row.values);
+                let values = self.study.measures.iter().zip(&row.values).zip(&row.still_moving);
                 values
-                    .map(|(measure, value)| format!("{} {}", measure.name, short(*value)))
+                    .map(|((measure, value), moving)| {
+                        let doubt = moving.as_ref().map_or_else(String::new, |gauge| {
+                            format!(" (too short? {gauge} still moves forward at the end)")
+                        });
+                        format!("{} {}{doubt}", measure.name, short(*value))
+                    })
                     .collect::<Vec<_>>()
                     .join(", ")
             }
@@ -276,14 +305,19 @@ pub fn words(study: &Study, values: &[f64], without: Option<usize>) -> String {
     all.map(|(_, (parameter, value))| format!("{} = {value}", parameter.name)).collect::<Vec<_>>().join(", ")
 }
 
-/// Whether the deck has what the measures speak of, as faults of the study file.
-fn check_measures(study: &Study, facts: &Facts) -> Result<(), String> {
+/// Whether the deck has what the measures speak of, as faults of the study file: of each measure the first.
+fn check_measures(study: &Study, ready: &BTreeMap<Point, Arc<Prepared>>) -> Result<(), String> {
     let text = &study.text;
     let faults = Faults::new(&study.file, text);
     for measure in &study.measures {
-        if let Err(why) = measure.formula.check(facts) {
-            let expected = "what the history of the deck has";
-            faults.add(measure.at, format!("of = \"{}\"", measure.words), expected, why.to_string());
+        let fault = ready.iter().enumerate().find_map(|(number, (point, prepared))| {
+            let why = measure.formula.check(&prepared.facts).err()?.to_string();
+            // What the first point lacks is hardly a matter of its values.
+            Some(if number == 0 { why } else { format!("{why} (at {})", words(study, &point.values, None)) })
+        });
+        if let Some(why) = fault {
+            let expected = "what the deck has";
+            faults.add(measure.at, format!("of = \"{}\"", measure.words), expected, why);
         }
     }
     let lines: Vec<String> = faults.into_list().iter().map(ToString::to_string).collect();
@@ -304,15 +338,16 @@ fn outcome_of(study: &Study, point: &Point, facts: &Facts, entry: &Path) -> Resu
     let summary: Summary = serde_json::from_str(&text).map_err(|e| fault(&e))?;
     let mut known = study.named(&point.values);
     known.extend(measure::of_summary(&summary));
-    let mut values = Vec::new();
+    let (mut values, mut still_moving) = (Vec::new(), Vec::new());
     for measure in &study.measures {
         match measure.formula.of_run(&history, facts, &known) {
             Ok(value) => {
                 known.insert(measure.name.clone(), value);
                 values.push(value);
+                still_moving.push(measure.formula.still_moving(&history, facts).map(str::to_owned));
             }
             Err(why) => return Ok(Outcome::Failed(format!("measure {}: {why}", measure.name))),
         }
     }
-    Ok(Outcome::Done(Row { values, cycles: summary.cycles, digest: summary.digest }))
+    Ok(Outcome::Done(Row { values, cycles: summary.cycles, digest: summary.digest, still_moving }))
 }

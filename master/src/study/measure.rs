@@ -7,12 +7,16 @@
 use std::fmt;
 
 use deck::{
-    Model,
     fault::nearest,
     parameters::{Parameters, names_in, value_of},
 };
 
 use crate::results::{Summary, history::Table};
+
+mod facts;
+
+pub use facts::Facts;
+use facts::{dot, listed, moving};
 
 /// Numbers of the summary that no machine changes.
 pub const OF_SUMMARY: [&str; 15] = [
@@ -36,6 +40,9 @@ pub const OF_SUMMARY: [&str; 15] = [
 /// What can be said in words.
 pub const PHRASES: &str = "residual velocity of NAME, max displacement of GAUGE, max displacement of GAUGE along AXIS, perforated, \
                            perforated by GAUGE through PART";
+
+/// Part of its velocity at the start below which a gauge counts as stopped: what is stuck in a plate shakes with it.
+const SLOW: f64 = 0.05;
 
 /// A named number.
 #[derive(Clone, Debug)]
@@ -121,6 +128,8 @@ pub enum Error {
     NoVelocity(String),
     /// A body at rest has no direction of its own.
     AtRest(String),
+    /// A gauge cannot perforate what is not before it.
+    Away { gauge: String, part: String },
     /// Which gauge or part is meant by `perforated` is not clear.
     Which { what: &'static str, found: usize },
     /// An expression that has no value.
@@ -159,6 +168,12 @@ impl fmt::Display for Error {
             Self::AtRest(name) => {
                 write!(f, "{name} is at rest at the start, so it has no direction to go on in")
             }
+            Self::Away { gauge, part } => {
+                write!(
+                    f,
+                    "at the start {part} is not before {gauge}, which flies away from it or past it; check the sign of the velocity and where both are"
+                )
+            }
             Self::Which { what, found } => {
                 write!(
                     f,
@@ -173,127 +188,53 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-/// What measures need to know of a deck.
-#[derive(Clone, Debug)]
-pub struct Facts {
-    /// Names and velocities at the start of gauges at nodes.
-    gauges: Vec<(String, [f64; 3])>,
-    parts: Vec<PartFacts>,
-    /// Columns of the history, without units.
-    columns: Vec<String>,
-}
-
-#[derive(Clone, Debug)]
-struct PartFacts {
-    name: String,
-    /// The box around its nodes.
-    low: [f64; 3],
-    high: [f64; 3],
-    /// Of all its nodes, where that is one.
-    velocity: Option<[f64; 3]>,
-}
-
-impl Facts {
-    /// Of a model, whose history has these columns.
-    pub fn of(model: &Model, columns: &[String]) -> Self {
-        let bare =
-            |column: &String| column.rsplit_once(" [").map_or(column.as_str(), |(bare, _)| bare).to_owned();
-        let part = |part: &mechanics::mesh::Part| {
-            let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-            for &node in &part.nodes {
-                let x = model.mesh.positions[node as usize];
-                low = std::array::from_fn(|axis| low[axis].min(x[axis]));
-                high = std::array::from_fn(|axis| high[axis].max(x[axis]));
-            }
-            let velocity = |node: &u32| model.velocity[*node as usize];
-            let first = part.nodes.first().map(velocity);
-            let velocity = first.filter(|first| part.nodes.iter().all(|node| velocity(node) == *first));
-            PartFacts { name: part.name.clone(), low, high, velocity }
-        };
-        Self {
-            gauges: model
-                .output
-                .gauges
-                .iter()
-                .map(|g| (g.name.clone(), model.velocity[g.node as usize]))
-                .collect(),
-            parts: model.mesh.parts.iter().map(part).collect(),
-            columns: columns.iter().map(bare).collect(),
-        }
-    }
-
-    fn gauge(&self, name: &str) -> Result<[f64; 3], Error> {
-        let found = self.gauges.iter().find(|(known, _)| known == name);
-        found.map(|(_, velocity)| *velocity).ok_or_else(|| Error::Owner {
-            what: "[[gauge]] at a node",
-            name: name.to_owned(),
-            known: listed(self.gauges.iter().map(|(name, _)| name.as_str())),
-        })
-    }
-
-    fn part(&self, name: &str) -> Result<&PartFacts, Error> {
-        self.parts.iter().find(|part| part.name == name).ok_or_else(|| Error::Owner {
-            what: "part",
-            name: name.to_owned(),
-            known: listed(self.parts.iter().map(|part| part.name.as_str())),
-        })
-    }
-
-    /// The gauge that moves and the parts at rest, if only one gauge and at least one part come in question.
-    fn perforation<'a>(
-        &'a self,
-        named: &Option<(String, String)>,
-    ) -> Result<(&'a str, [f64; 3], Vec<&'a PartFacts>), Error> {
-        if let Some((gauge, part)) = named {
-            let velocity = self.gauge(gauge)?;
-            let name =
-                self.gauges.iter().find(|(known, _)| known == gauge).map_or("", |(name, _)| name.as_str());
-            return Ok((name, moving(gauge, velocity)?, vec![self.part(part)?]));
-        }
-        let at_rest = |velocity: &[f64; 3]| *velocity == [0.0; 3];
-        let moving: Vec<&(String, [f64; 3])> = self.gauges.iter().filter(|(_, v)| !at_rest(v)).collect();
-        let targets: Vec<&PartFacts> =
-            self.parts.iter().filter(|part| part.velocity.as_ref().is_some_and(at_rest)).collect();
-        match (moving[..].as_ref(), targets.is_empty()) {
-            ([(name, velocity)], false) => Ok((name, *velocity, targets)),
-            ([_], true) => Err(Error::Which { what: "parts that are at rest at the start", found: 0 }),
-            (several, _) => {
-                Err(Error::Which { what: "gauges at nodes that move at the start", found: several.len() })
-            }
-        }
-    }
-}
-
-fn moving(name: &str, velocity: [f64; 3]) -> Result<[f64; 3], Error> {
-    if velocity == [0.0; 3] { Err(Error::AtRest(name.to_owned())) } else { Ok(velocity) }
-}
-
-fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    let names: Vec<&str> = names.collect();
-    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 impl Formula {
     /// Reads a formula. Columns, gauges and parts are looked for in [`Formula::check`], once a deck is known.
     ///
     /// # Errors
     /// If a bracket stays open or a name is none of `known`.
     pub fn parse(text: &str, known: &[&str]) -> Result<Self, Error> {
+        let pieces: Vec<&str> = text.split(" and ").collect();
         let mut formula = Self { clauses: Vec::new(), quantities: Vec::new() };
-        for clause in text.split(" and ") {
-            let (left, right) = match split_at_order(clause) {
-                Some((left, order, right)) => (left, Some((order, right))),
-                None => (clause, None),
-            };
-            let left = formula.term(left, known)?;
-            let right = right.map(|(order, right)| formula.term(right, known).map(|right| (order, right)));
-            formula.clauses.push(Clause { left, right: right.transpose()? });
+        for clause in Self::clauses(&pieces, known) {
+            formula.clause(&clause, known)?;
         }
         Ok(formula)
+    }
+
+    /// Clauses of what stands between the words "and". Names may have that word in them: where a piece is no clause, one that goes over several
+    /// pieces is taken. Every piece is one where that comes to nothing, so that a fault is told of the least part of the formula.
+    fn clauses(pieces: &[&str], known: &[&str]) -> Vec<String> {
+        let is_clause =
+            |text: &str| Self { clauses: Vec::new(), quantities: Vec::new() }.clause(text, known).is_ok();
+        let n = pieces.len();
+        // By piece, where the clause that begins with it ends so that the rest are clauses too; none beyond the last are needed.
+        let mut ends: Vec<Option<usize>> = vec![None; n];
+        ends.push(Some(n));
+        for start in (0..n).rev() {
+            ends[start] = (start + 1..=n)
+                .find(|&end| ends[end].is_some() && is_clause(&pieces[start..end].join(" and ")));
+        }
+        let mut clauses = Vec::new();
+        let mut start = 0;
+        while start < n {
+            let end = ends[0].and_then(|_| ends[start]).unwrap_or(start + 1);
+            clauses.push(pieces[start..end].join(" and "));
+            start = end;
+        }
+        clauses
+    }
+
+    /// Reads and adds a clause.
+    fn clause(&mut self, clause: &str, known: &[&str]) -> Result<(), Error> {
+        let (left, right) = match split_at_order(clause) {
+            Some((left, order, right)) => (left, Some((order, right))),
+            None => (clause, None),
+        };
+        let left = self.term(left, known)?;
+        let right = right.map(|(order, right)| self.term(right, known).map(|right| (order, right)));
+        self.clauses.push(Clause { left, right: right.transpose()? });
+        Ok(())
     }
 
     /// A side of a comparison, with names in place of what the results are asked for.
@@ -386,8 +327,8 @@ impl Formula {
                     }
                 }
                 Quantity::ResidualVelocity(name) => {
-                    if let Ok(velocity) = facts.gauge(name) {
-                        moving(name, velocity)?;
+                    if let Ok(gauge) = facts.gauge(name) {
+                        moving(name, gauge.velocity)?;
                     } else if facts.parts.iter().any(|part| part.name == *name) {
                         let velocity =
                             facts.part(name)?.velocity.ok_or_else(|| Error::NoVelocity(name.clone()))?;
@@ -430,6 +371,19 @@ impl Formula {
             all.insert(format!("__{index}"), quantity.of(history, facts)?);
         }
         self.value(&all)
+    }
+
+    /// The gauge that has not perforated what it should and yet moves on at the end of the run, at more than [`SLOW`] of its velocity: the run
+    /// may be too short to tell.
+    pub fn still_moving<'a>(&self, history: &Table, facts: &'a Facts) -> Option<&'a str> {
+        self.quantities.iter().find_map(|quantity| {
+            let Quantity::Perforated(named) = quantity else { return None };
+            let (gauge, _) = facts.perforation(named).ok()?;
+            let left = Quantity::ResidualVelocity(gauge.name.clone()).of(history, facts).ok()?;
+            let speed = dot(gauge.velocity, gauge.velocity).sqrt();
+            let passed = quantity.of(history, facts).ok()? != 0.0;
+            (!passed && left > SLOW * speed).then_some(gauge.name.as_str())
+        })
     }
 
     fn value(&self, known: &Parameters) -> Result<f64, Error> {
@@ -517,7 +471,10 @@ impl Quantity {
         match self {
             Self::Column(reduction, name) => Ok(reduction.of(&column(name)?)),
             Self::ResidualVelocity(name) => match facts.gauge(name) {
-                Ok(start) => Ok(dot(vector(name, "v")?, start) / dot(start, start).sqrt()),
+                Ok(gauge) => {
+                    let start = gauge.velocity;
+                    Ok(dot(vector(name, "v")?, start) / dot(start, start).sqrt())
+                }
                 Err(_) => {
                     let start = facts.part(name)?.velocity.ok_or_else(|| Error::NoVelocity(name.clone()))?;
                     let along = |momentum: [f64; 3]| dot(momentum, start);
@@ -539,15 +496,10 @@ impl Quantity {
                 Ok(squares.fold(0.0, f64::max).sqrt())
             }
             Self::Perforated(named) => {
-                let (gauge, start, targets) = facts.perforation(named)?;
-                let (x, v) = (vector(gauge, "")?, vector(gauge, "v")?);
-                // The corner of a box that lies farthest along the way.
-                let end = |part: &&PartFacts| {
-                    let corner =
-                        |axis: usize| if start[axis] > 0.0 { part.high[axis] } else { part.low[axis] };
-                    dot([corner(0), corner(1), corner(2)], start)
-                };
-                let passed = targets.iter().all(|part| dot(x, start) > end(part));
+                let (gauge, targets) = facts.perforation(named)?;
+                let start = gauge.velocity;
+                let (x, v) = (vector(&gauge.name, "")?, vector(&gauge.name, "v")?);
+                let passed = targets.iter().all(|part| dot(x, start) > part.along(start)[1]);
                 Ok(f64::from(u8::from(passed && dot(v, start) > 0.0)))
             }
         }

@@ -93,11 +93,11 @@ fn goal(study: &Study, outcomes: &Outcomes) -> String {
     header.extend(["low", "high", "at", "value", "result"].map(str::to_owned));
     html.push_str(&row(&header, "th"));
     for (site, found) in table::found(study, outcomes).iter().take(MOST_ROWS) {
-        let (word, numbers) = told(found.as_ref());
+        let (_, numbers) = told(found.as_ref());
         let mut cells: Vec<String> = others.iter().map(|&n| label(site.values[n])).collect();
         cells.extend(study.scatter.map(|_| site.sample.to_string()));
         cells.extend(numbers.map(|number| number.map_or_else(String::new, label)));
-        cells.push(word.to_owned());
+        cells.push(table::result(study, outcomes, site, found.as_ref()));
         html.push_str(&row(&cells, "td"));
     }
     html.push_str("</table></div>\n");

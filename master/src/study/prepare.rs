@@ -1,6 +1,6 @@
 //! Points made ready to run: their decks read and checked, with their identities.
 
-use deck::{Fault, Model, bundle};
+use deck::{Fault, Model, bundle, physics};
 
 use super::{
     cache::{self, identity_of},
@@ -20,6 +20,8 @@ pub struct Prepared {
     pub title: String,
     pub elements: u64,
     pub facts: Facts,
+    /// What is hardly meant by it, as `bolide check` says it.
+    pub warnings: Vec<String>,
 }
 
 impl Prepared {
@@ -66,8 +68,11 @@ impl std::error::Error for Error {}
 pub fn prepare(study: &Study, point: &Point) -> Result<Prepared, Error> {
     let text = deck_file::gather_deck(&study.deck, &study.options_at(point)).map_err(Error::Deck)?;
     let name = study.deck.display().to_string();
-    let model = deck::read(&text, &name).map_err(Error::Faults)?;
+    let reading = deck::read_whole(&text, &name).map_err(Error::Faults)?;
+    let model = reading.model;
+    let of_reader = reading.warnings.iter().map(ToString::to_string);
     Ok(Prepared {
+        warnings: of_reader.chain(physics::forecast(&model).warnings).collect(),
         identity: identity_of(&model).map_err(Error::Identity)?,
         title: model.title.clone(),
         elements: model.mesh.n_elements() as u64,

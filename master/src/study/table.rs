@@ -31,6 +31,10 @@ pub struct Row {
     pub values: Vec<f64>,
     pub cycles: u64,
     pub digest: String,
+    /// By measure, the gauge that had not perforated and yet moved on at the end, if there is one ([`Formula::still_moving`]).
+    ///
+    /// [`Formula::still_moving`]: super::measure::Formula::still_moving
+    pub still_moving: Vec<Option<String>>,
 }
 
 /// Outcomes by point.
@@ -95,7 +99,7 @@ pub fn table(study: &Study, outcomes: &Outcomes) -> String {
         let mut cells = numbers(&point.values, None);
         cells.extend(study.scatter.map(|_| point.sample.to_string()));
         match outcome {
-            Outcome::Done(Row { values, cycles, digest }) => {
+            Outcome::Done(Row { values, cycles, digest, still_moving: _ }) => {
                 cells.extend(numbers(values, None));
                 cells.extend([cycles.to_string(), digest.clone(), "done".to_owned()]);
             }
@@ -127,6 +131,32 @@ pub fn told(found: Option<&Found>) -> (&'static str, [Option<f64>; 4]) {
     }
 }
 
+/// What a search found in words, as [`told`], and whether the run that it rests on may have been too short.
+pub fn result(study: &Study, outcomes: &Outcomes, site: &Site, found: Option<&Found>) -> String {
+    let word = told(found).0;
+    if is_too_short(study, outcomes, site, found) { format!("{word}; {TOO_SHORT}") } else { word.to_owned() }
+}
+
+/// Behind the result of a search whose "no" is not sure.
+const TOO_SHORT: &str = "runs may be too short";
+
+fn is_too_short(study: &Study, outcomes: &Outcomes, site: &Site, found: Option<&Found>) -> bool {
+    let Some(search) = study.goal.search() else { return false };
+    let is_moving = |at: f64| {
+        let mut values = site.values.clone();
+        values[search.parameter] = at;
+        match outcomes.get(&Point { values, sample: site.sample }) {
+            Some(Outcome::Done(row)) => row.still_moving[search.measure].is_some(),
+            _ => false,
+        }
+    };
+    match found {
+        Some(&Found::Limit { low, high, rising }) => is_moving(if rising { low } else { high }),
+        Some(Found::NoChange { reaches: false }) => is_moving(search.from) || is_moving(search.to),
+        _ => false,
+    }
+}
+
 /// `goal.csv`; none for a table.
 pub fn goal(study: &Study, outcomes: &Outcomes) -> Option<String> {
     let search = study.goal.search()?;
@@ -143,7 +173,7 @@ pub fn goal(study: &Study, outcomes: &Outcomes) -> Option<String> {
     header.push("result".to_owned());
     let mut text = line(&header);
     for (site, found) in found(study, outcomes) {
-        let (word, [low, high, at, value]) = told(found.as_ref());
+        let (_, [low, high, at, value]) = told(found.as_ref());
         let mut cells = numbers(&site.values, Some(search.parameter));
         cells.extend(study.scatter.map(|_| site.sample.to_string()));
         let cell = |number: Option<f64>| number.map_or_else(String::new, |number| format!("{number:?}"));
@@ -151,7 +181,7 @@ pub fn goal(study: &Study, outcomes: &Outcomes) -> Option<String> {
         if matches!(study.goal, Goal::Least { .. }) {
             cells.push(cell(value));
         }
-        cells.push(word.to_owned());
+        cells.push(result(study, outcomes, &site, found.as_ref()));
         text.push_str(&line(&cells));
     }
     Some(text)

@@ -1,6 +1,9 @@
 //! Formulas against a small history.
 
-use super::*;
+use super::{
+    facts::{GaugeFacts, PartFacts},
+    *,
+};
 
 fn history() -> Table {
     let columns =
@@ -18,7 +21,10 @@ fn history() -> Table {
 fn facts() -> Facts {
     let part = |name: &str, low, high, velocity| PartFacts { name: name.to_owned(), low, high, velocity };
     Facts {
-        gauges: vec![("rear".to_owned(), [0.0, 0.0, -300.0]), ("edge".to_owned(), [0.0; 3])],
+        gauges: vec![
+            GaugeFacts { name: "rear".to_owned(), x: [0.0, 0.0, 20.0], velocity: [0.0, 0.0, -300.0] },
+            GaugeFacts { name: "edge".to_owned(), x: [9.0, 0.0, 0.0], velocity: [0.0; 3] },
+        ],
         parts: vec![
             part("rod", [-2.0, -2.0, 0.0], [2.0, 2.0, 20.0], Some([0.0, 0.0, -300.0])),
             part("plate", [-9.0, -9.0, -5.0], [9.0, 9.0, 0.0], Some([0.0; 3])),
@@ -89,4 +95,76 @@ fn comparisons_say_yes_or_no() {
     for (text, is) in [("perforated", true), ("a > 1", true), ("a", false), ("perforated and a > 1", true)] {
         assert_eq!(Formula::parse(text, &["a"]).map(|formula| formula.is_comparison()), Ok(is), "{text}");
     }
+}
+
+#[test]
+fn what_a_gauge_is_to_perforate_lies_before_it() {
+    let with = |x: [f64; 3], velocity: [f64; 3]| {
+        let mut facts = facts();
+        facts.gauges[0].x = x;
+        facts.gauges[0].velocity = velocity;
+        let formula = Formula::parse("perforated by rear through plate", &[]).expect("a phrase");
+        (formula.check(&facts), Formula::parse("perforated", &[]).expect("a phrase").check(&facts))
+    };
+    let away = Err(Error::Away { gauge: "rear".to_owned(), part: "plate".to_owned() });
+    // It flies away, it is through already, it passes beside.
+    for (x, velocity) in [
+        ([0.0, 0.0, 20.0], [0.0, 0.0, 300.0]),
+        ([0.0, 0.0, -8.0], [0.0, 0.0, -300.0]),
+        ([20.0, 0.0, -2.0], [0.0, 0.0, -300.0]),
+    ] {
+        assert_eq!(with(x, velocity), (away.clone(), away.clone()), "{x:?} {velocity:?}");
+    }
+    // Straight, where it touches, at a slant beside a far corner of the box, out of it.
+    for (x, velocity) in [
+        ([0.0, 0.0, 20.0], [0.0, 0.0, -300.0]),
+        ([0.0, 0.0, 0.0], [0.0, 0.0, -300.0]),
+        ([-4.0, 0.0, 3.0], [200.0, 0.0, -200.0]),
+        ([0.0, 0.0, -2.0], [0.0, 0.0, -300.0]),
+    ] {
+        assert_eq!(with(x, velocity), (Ok(()), Ok(())), "{x:?} {velocity:?}");
+    }
+}
+
+#[test]
+fn a_run_that_ends_before_its_gauge_has_stopped_may_be_too_short() {
+    let moving = |z: f64, vz: f64, text: &str| {
+        let mut history = history();
+        let last = history.rows.last_mut().expect("rows");
+        (last[3], last[6]) = (z, vz);
+        let facts = facts();
+        Formula::parse(text, &["a"]).expect("a phrase").still_moving(&history, &facts).map(str::to_owned)
+    };
+    let rear = Some("rear".to_owned());
+    assert_eq!(moving(-2.0, -150.0, "perforated"), rear);
+    assert_eq!(moving(-2.0, -150.0, "perforated by rear through plate and a > 1"), rear);
+    // It is through, it is stuck, it comes back, nobody asks.
+    assert_eq!(moving(-8.0, -150.0, "perforated"), None);
+    assert_eq!(moving(-2.0, -9.0, "perforated"), None);
+    assert_eq!(moving(-2.0, 150.0, "perforated"), None);
+    assert_eq!(moving(-2.0, -150.0, "max(rear:uz)"), None);
+}
+
+#[test]
+fn names_may_have_the_word_in_them_that_stands_between_clauses() {
+    let mut facts = facts();
+    facts.gauges[0].name = "nut and bolt".to_owned();
+    facts.parts[1].name = "front and rear".to_owned();
+    facts.columns.iter_mut().for_each(|column| *column = column.replace("rear:", "nut and bolt:"));
+    for text in [
+        "residual velocity of nut and bolt",
+        "residual velocity of nut and bolt > 75 and a > 1",
+        "a > 1 and perforated by nut and bolt through front and rear and a < 2",
+        "max displacement of nut and bolt along x",
+        "max(nut and bolt:uz) / a < 1 and perforated",
+    ] {
+        let formula = Formula::parse(text, &["a"]).expect(text);
+        assert_eq!(formula.check(&facts), Ok(()), "{text}");
+    }
+    let clauses = |text| Formula::parse(text, &["a"]).expect(text).clauses.len();
+    assert_eq!(clauses("perforated by nut and bolt through plate and a < 2"), 2);
+    assert_eq!(clauses("residual velocity of nut and bolt > 1 and a > 1 and a < 3"), 3);
+    // A fault is told of its own piece.
+    let fault = Formula::parse("a > 1 and b > 2", &["a"]).expect_err("no b").to_string();
+    assert!(fault.contains("summary b; write a"), "{fault}");
 }
