@@ -154,6 +154,11 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
         assert!(forecast.contains(words), "{words} in {forecast}");
     }
     assert_eq!(browser.evaluate("document.querySelectorAll('#jobs li').length"), 0);
+    // One that is refused after it takes its card away: nothing is left that runs the other under a wrong name.
+    browser.evaluate(&drop_files(&[("bad.toml", &bad)]));
+    browser.wait_for("!document.getElementById('faults').hidden");
+    assert_eq!(browser.evaluate("document.getElementById('deck').hidden"), true);
+    browser.evaluate(&drop_files(&[("plates-small.toml", &deck)]));
     run_it(&mut browser, "plates-small.toml");
     browser.wait_for("document.getElementById('facts').innerText.includes('queued')");
     // One click on Cancel asks, and ends nothing.
@@ -165,6 +170,7 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     browser.evaluate("document.getElementById('hold').click()");
     browser.wait_for("document.getElementById('facts').innerText.includes('held, waits for')");
     assert_eq!(browser.evaluate("document.getElementById('hold').hidden"), true);
+    assert_eq!(browser.evaluate("document.getElementById('cancel').hidden"), false);
     browser.evaluate("document.getElementById('resume').click()");
     browser.wait_for("document.getElementById('facts').innerText.includes('queued')");
     assert_eq!(browser.evaluate("document.getElementById('resume').hidden"), true);
@@ -336,6 +342,23 @@ fn a_dropped_deck_runs_is_turned_and_gives_the_digest_of_the_command_line() {
     let twice = "(ids => ids.filter((id, i) => ids.indexOf(id) !== i))([...document.querySelectorAll('[id]')].map(e => e.id))";
     assert_eq!(browser.evaluate(twice), serde_json::json!([]), "each control has a name of its own");
 
+    // One that runs is held, and shows its curves again when it goes on.
+    let long = std::fs::read_to_string(&path).expect("a deck of this repository");
+    browser.evaluate("document.getElementById('cycles').value = ''");
+    browser.evaluate(&drop_files(&[("long.toml", &long)]));
+    run_it(&mut browser, "long.toml");
+    let runs = "document.getElementById('title').textContent.startsWith('job 13:') && \
+         document.getElementById('facts').innerText.includes('running') && !document.getElementById('panels').hidden";
+    browser.wait_for(runs);
+    browser.evaluate("document.getElementById('hold').click()");
+    browser.wait_for("document.getElementById('facts').innerText.includes('held, waits for')");
+    // The page looks once a second.
+    std::thread::sleep(std::time::Duration::from_millis(2500));
+    browser.evaluate("document.getElementById('resume').click()");
+    browser.wait_for(runs);
+    browser.evaluate("document.getElementById('cancel').click(); document.getElementById('cancel').click()");
+    browser.wait_for("document.getElementById('facts').innerText.includes('cancelled')");
+
     let run = said(Command::new(BOLIDE).args(["run", &deck, "--cycles", "40", "--no-output", "--json"]));
     let summary: serde_json::Value = serde_json::from_str(&run.out).expect("a summary");
     assert_eq!(digest, summary["digest"]);
@@ -359,7 +382,15 @@ fn a_report_shows_results_without_a_master_mirrored_and_beside_each_other() {
     std::fs::write(&quarter, text).expect("room");
     assert!(deck.contains("COPPER_TAYLOR_BENCHMARK"));
     let mut folders = Vec::new();
-    for (name, deck) in [("bar", &bar), ("quarter", &quarter.display().to_string())] {
+    // The same quarter in other units.
+    let si = folder.path().join("si.toml");
+    let text = text
+        .replace("mm-ms-kg", "SI")
+        .replace("0.002", "2e-6")
+        .replace("[-3, -3, 0], size = [6, 6, 12]", "[-3e-3, -3e-3, 0], size = [6e-3, 6e-3, 12e-3]");
+    std::fs::write(&si, text).expect("room");
+    let (quarter, si) = (quarter.display().to_string(), si.display().to_string());
+    for (name, deck) in [("si", &si), ("bar", &bar), ("quarter", &quarter)] {
         let out = folder.path().join(name);
         let run = said(Command::new(BOLIDE).args(["run", deck, "--cycles", "60", "--out"]).arg(&out));
         assert!(run.out.contains("quality    "), "{}", run.out);
@@ -370,7 +401,7 @@ fn a_report_shows_results_without_a_master_mirrored_and_beside_each_other() {
     let page = report.wait_for("page: http://").trim_start_matches("page: ").to_owned();
     let mut browser = Browser::start(&program, &folder.path().join("profile"));
     browser.call("Page.navigate", serde_json::json!({ "url": page }));
-    browser.wait_for("document.getElementById('title')?.textContent.startsWith('job 2: quarter')");
+    browser.wait_for("document.getElementById('title')?.textContent.startsWith('job 3: quarter')");
     // Three mirror images stand around the quarter.
     browser.wait_for("document.getElementById('bodies').dataset.images === '4'");
     set(&mut browser, "mirror", "false");
@@ -387,7 +418,7 @@ fn a_report_shows_results_without_a_master_mirrored_and_beside_each_other() {
     set(&mut browser, "state", "100");
     browser.wait_for(&format!("document.getElementById('bodies').dataset.cycle === '{end}'"));
     assert_eq!(shown(&mut browser, "bodies", "radius").to_bits(), long.to_bits());
-    set(&mut browser, "beside", "1");
+    set(&mut browser, "beside", "2");
     browser.wait_for("document.getElementById('measured').innerText.includes('differs')");
     browser.wait_for("Number(document.getElementById('other').dataset.faces) > 100");
     // The bar is longer than twice the quarter: each fills its picture, which the page says, and both turn together.
@@ -403,13 +434,23 @@ fn a_report_shows_results_without_a_master_mirrored_and_beside_each_other() {
     press(&mut browser, "bodies", "ArrowRight");
     assert_ne!(shown(&mut browser, "other", "around"), before);
     assert_eq!(shown(&mut browser, "other", "around"), shown(&mut browser, "bodies", "around"));
+    // Numbers in other units stand with them, and are not compared.
+    set(&mut browser, "beside", "1");
+    browser.wait_for(
+        "document.getElementById('measures').innerText.includes('job 1 has other units than job 3')",
+    );
+    let measured = browser.evaluate("document.getElementById('measured').innerText");
+    let measured = measured.as_str().expect("text");
+    let end = measured.lines().find(|line| line.starts_with("end")).expect("a row");
+    assert!(end.contains(" ms") && end.contains("e-6 s") && !end.contains('%'), "{end}");
+    browser.wait_for("document.getElementById('history-legend').innerText.includes('job 1 has other units')");
     let refused = browser.evaluate(
         "fetch('../api/jobs?name=x.toml', { method: 'POST', body: '[control]' }).then(answer => answer.status)",
     );
     assert_eq!(refused, 422, "a deck with faults");
     // The report of the folder opens in the page, with its style and without scripts.
     let styled = browser.evaluate(
-        "fetch('../api/jobs/1/files/report.html').then(answer => answer.headers.get('content-security-policy'))",
+        "fetch('../api/jobs/2/files/report.html').then(answer => answer.headers.get('content-security-policy'))",
     );
     assert!(styled.as_str().is_some_and(|policy| policy.starts_with("default-src 'none'; ")), "{styled}");
 }

@@ -84,8 +84,9 @@ export function draw(canvas, { x, series, xName, yName, floor }) {
   c.setLineDash([]);
 }
 
-/// Entries of a legend: `{ colour, dash, words }` each.
-export function legend(parent, entries) {
+/// Entries of a legend: `{ colour, dash, words }` each, and words behind them.
+export function legend(parent, entries, more = '') {
+  parent.querySelector('.more')?.remove();
   if (parent.children.length !== entries.length || [...parent.children].some((item, i) => item.dataset.look !== `${entries[i].colour} ${entries[i].dash}`)) {
     parent.replaceChildren(...entries.map(({ colour: stroke, dash }) => {
       const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
@@ -100,4 +101,5 @@ export function legend(parent, entries) {
     }));
   }
   entries.forEach(({ words }, i) => { if (parent.children[i].lastChild.textContent !== words) parent.children[i].lastChild.textContent = words; });
+  if (more) parent.append(element('li', { className: 'more', textContent: more }));
 }

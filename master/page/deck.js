@@ -11,6 +11,8 @@ const $ = id => document.getElementById(id);
 const MOST_DRAWN = 400000;
 /// Bytes of a text beyond which a browser edits it badly.
 const MOST_EDITED = 4e6;
+/// Ends of runs (s) beyond which they end by their cycles.
+const MOST_TIME = 1e60;
 
 let canvas;
 /// The deck on the table: `{ name, text, texts }` as files.bundle makes it.
@@ -26,8 +28,8 @@ const fault = error => {
 
 /// Looks at a deck that has come, a promise of files.
 export async function take(coming) {
-  deck = null;
-  $('faults').hidden = true;
+  // The card of the deck before it would run that one.
+  close();
   try {
     await look(files.bundle(await coming));
   } catch (error) {
@@ -38,7 +40,7 @@ export async function take(coming) {
 
 /// The deck of a job, to change and run again.
 export async function again(number) {
-  $('faults').hidden = true;
+  close();
   try {
     const [text, status] = await Promise.all([ask(`api/jobs/${number}/files/input.deck`).then(answer => answer.text()), json(`api/jobs/${number}`)]);
     const name = status.ended?.summary?.origin?.deck?.split(/[/\\]/).at(-1) || 'deck.toml';
@@ -54,6 +56,8 @@ async function look(found) {
   deck = found;
   const name = encodeURIComponent(deck.name);
   const { forecast, reading } = await json(`api/check?name=${name}`, { method: 'POST', body: deck.text });
+  // Another one has come meanwhile.
+  if (deck !== found) return;
   const { title, parts, warnings, elements, cycles, first_step_s: step, end_time_s: end, memory_bytes: memory, thread_s: takes } = forecast;
   $('deck').hidden = false;
   $('h-deck').textContent = `${deck.name}: ${title}`;
@@ -61,7 +65,8 @@ async function look(found) {
   $('doubts').replaceChildren(...doubts.map(words => lists.element('li', { className: 'look' }, lists.element('b', { textContent: 'look' }), ` ${words}`)));
   if (!doubts.length) $('doubts').append(lists.element('li', { className: 'good' }, lists.element('b', { textContent: 'no fault' }), ' and nothing doubtful'));
   $('forecast').textContent = [
-    `${elements.toLocaleString('en')} elements, to ${lists.number(end * 1e3, 3)} ms`,
+    // A run of a count of cycles has no end in time.
+    `${elements.toLocaleString('en')} elements${end <= MOST_TIME ? `, to ${lists.number(end * 1e3, 3)} ms` : ''}`,
     step && `first step ${lists.number(step * 1e9, 3)} ns, ${cycles.toLocaleString('en')} cycles`,
     takes != null && `${takes < 1 ? 'less than 1 s' : lists.seconds(takes)} on one thread`, `${lists.bytes(memory)} of memory`,
   ].filter(Boolean).join('; ');
@@ -100,6 +105,7 @@ function changed() {
 }
 
 async function run() {
+  if (!deck) return;
   try {
     deck = changed();
     const query = new URLSearchParams({ name: deck.name, min_workers: $('min-workers').value || '1' });

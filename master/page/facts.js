@@ -8,7 +8,8 @@ export function draw(now, sheet, { only_shows: shows }) {
   const { brief } = now, running = now.state === 'running', units = sheet?.units;
   document.title = `job ${now.job}: ${now.title}, Bolide`;
   $('title').textContent = `job ${now.job}: ${now.title}`;
-  $('cancel').hidden = $('hold').hidden = !(running || now.state === 'queued');
+  $('hold').hidden = !(running || now.state === 'queued');
+  $('cancel').hidden = $('hold').hidden && now.state !== 'held';
   $('resume').hidden = !(now.state === 'held' || now.state === 'failed');
   $('again').hidden = shows || now.state === 'queued';
   $('progress').hidden = !running;

@@ -73,8 +73,12 @@ export async function update(job, beside) {
     fill(runs[0].found);
     const key = $('quantity').value, series = [];
     for (const [place, run] of runs.entries()) {
-      const { curves: list = [] } = run.found.get(key) ?? {};
+      const { curves: list = [], unit } = run.found.get(key) ?? {};
       const chosen = list.slice(0, MOST), time = run.columns.findIndex(column => /^time( |$)/.test(column));
+      if (place && chosen.length && (unit !== drawn.unit || parsed(run.columns[time]).unit !== drawn.time)) {
+        drawn.note = `job ${run.number} has other units, so its curves are left out`;
+        continue;
+      }
       const { values } = await json(`api/jobs/${run.number}/history?columns=${[time, ...chosen.map(curve => curve.index)].join(',')}`);
       chosen.forEach((curve, i) => series.push({
         name: runs.length > 1 ? `${curve.owner}, job ${run.number}` : curve.owner,
@@ -99,12 +103,12 @@ export async function update(job, beside) {
 
 export function draw() {
   if (!drawn) return;
-  const { series, unit, time, left } = drawn;
+  const { series, unit, time, left, note } = drawn;
   curves.draw($('history'), { x: series[0]?.x ?? [], xName: `time (${time})`, yName: unit ?? '', series });
   const last = s => s.y.findLast(v => v !== null);
   const words = s => `${s.name}${last(s) === undefined ? '' : ` ${number(last(s), 4)}`}`;
-  curves.legend($('history-legend'), series.map(s => ({ ...s, words: words(s) })));
-  if (left > 0) $('history-legend').append(`and ${left} more in history.csv`);
+  const beside = [left > 0 && `and ${left} more in history.csv`, note].filter(Boolean).join('; ');
+  curves.legend($('history-legend'), series.map(s => ({ ...s, words: words(s) })), beside);
   const name = $('quantity').selectedOptions[0]?.textContent ?? '';
   $('history').setAttribute('aria-label', `${name} over time, last: ${series.map(words).join(', ')}`);
 }

@@ -119,7 +119,8 @@ async function sheet() {
     $('unkept').textContent = 'Curves and bodies come when the job runs.';
     return;
   }
-  if (page.sheet?.final) return;
+  // One that was held or has failed may be resumed, and goes on.
+  if (page.sheet?.final && now.state !== 'running') return;
   const final = now.state !== 'running';
   page.asking = true;
   try {
@@ -128,6 +129,7 @@ async function sheet() {
     page.sheet = Object.assign(found, { final });
     $('panels').hidden = false;
     $('unkept').hidden = true;
+    if (!final) $('outcome').hidden = true;
     job();
     panels();
     const due = final || page.ticks++ % HISTORY_EVERY === 0;
@@ -145,7 +147,7 @@ async function sheet() {
 const bodies = () => view.update({ job: page.chosen, sheet: page.sheet }, page.beside);
 
 /// What is there once a job is over.
-const ended = () => outcome.draw(page.chosen, page.beside?.job, page.sheet);
+const ended = () => outcome.draw({ job: page.chosen, sheet: page.sheet }, page.beside);
 
 function panels() {
   const { workers, phases } = page.sheet;
@@ -177,7 +179,7 @@ async function beside() {
     $('at').textContent = error.message;
   }
   if (of !== page.chosen || !page.sheet) return;
-  await Promise.all([bodies(), history.update(of, page.beside?.job), page.sheet.final && outcome.draw(of, page.beside?.job, page.sheet)]);
+  await Promise.all([bodies(), history.update(of, page.beside?.job), page.sheet.final && ended()]);
 }
 
 /// A job was submitted here.
@@ -229,6 +231,9 @@ async function act(name) {
     await ask(`api/jobs/${page.chosen}/${name}`, { method: 'POST' });
   } catch (error) {
     lists.say($('faults'), error.message);
+    // In a narrow window the box is closed, and far from the button.
+    $('submit-box').open = true;
+    $('faults').focus();
   }
 }
 

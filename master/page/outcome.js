@@ -18,31 +18,33 @@ async function summary(number) {
 
 const norm = v => Math.hypot(...v);
 
-/// Rows of a table: a name, and how a summary tells it.
-function rows({ units }, summaries) {
+/// Rows of a table: a name, its unit by the units of a run (null without one), and how a summary tells it.
+function rows(summaries) {
   const parts = [...new Set(summaries.flatMap(s => s.energies.parts.map(part => part.name)))].slice(0, 12);
   const of = (s, name) => s.energies.parts.find(part => part.name === name);
   const speed = part => part?.mass > 0 ? norm(part.momentum) / part.mass : undefined;
-  const { energy, length, time, mass } = units;
+  const energy = u => u.energy, length = u => u.length, time = u => u.time, mass = u => u.mass, speeds = u => `${length(u)}/${time(u)}`;
   return [
-    ['cycles', s => s.cycles], [`end (${time})`, s => s.end_time], ['elements', s => s.elements], ['eroded elements', s => s.eroded_elements],
-    [`kinetic energy (${energy})`, s => s.energies.kinetic], [`internal energy (${energy})`, s => s.energies.internal],
-    [`hourglass energy (${energy})`, s => s.energies.hourglass], [`contact and friction (${energy})`, s => s.energies.contact],
-    [`eroded energy (${energy})`, s => s.eroded_energy], ['energy error (%)', s => 100 * s.energies.error],
-    ['worst depth of contact (gaps)', s => s.worst_penetration],
-    ...parts.map(name => [`${name}: mean speed (${length}/${time})`, s => speed(of(s, name))]),
-    ...parts.map(name => [`${name}: mass (${mass})`, s => of(s, name)?.mass]),
-    ...parts.map(name => [`${name}: internal energy (${energy})`, s => of(s, name)?.internal]),
-    ['time of the run (s)', s => s.wall_s],
+    ['cycles', null, s => s.cycles], ['end', time, s => s.end_time], ['elements', null, s => s.elements], ['eroded elements', null, s => s.eroded_elements],
+    ['kinetic energy', energy, s => s.energies.kinetic], ['internal energy', energy, s => s.energies.internal],
+    ['hourglass energy', energy, s => s.energies.hourglass], ['contact and friction', energy, s => s.energies.contact],
+    ['eroded energy', energy, s => s.eroded_energy], ['energy error (%)', null, s => 100 * s.energies.error],
+    ['worst depth of contact (gaps)', null, s => s.worst_penetration],
+    ...parts.map(name => [`${name}: mean speed`, speeds, s => speed(of(s, name))]),
+    ...parts.map(name => [`${name}: mass`, mass, s => of(s, name)?.mass]),
+    ...parts.map(name => [`${name}: internal energy`, energy, s => of(s, name)?.internal]),
+    ['time of the run (s)', null, s => s.wall_s],
   ];
 }
 
-/// Shows a job that is over, beside another one or alone.
-export async function draw(number, beside, sheet) {
-  const [one, other] = await Promise.all([number, beside].filter(Boolean).map(summary));
+/// Shows a job that is over, beside another one or none: `{ job, sheet }` each.
+export async function draw(chosen, beside) {
+  const number = chosen.job, [one, other] = await Promise.all([chosen, beside].filter(Boolean).map(run => summary(run.job)));
   $('outcome').hidden = !one;
   if (!one) return;
   const { quality, warnings, origin } = one;
+  // Numbers in other units are not compared: each stands with its unit.
+  const alike = !other || JSON.stringify(chosen.sheet.units) === JSON.stringify(beside.sheet.units);
   // Of a run that could not begin nothing can be judged.
   const grade = quality.measures.length ? quality.grade : '';
   $('verdict').textContent = { good: 'good', look: 'look at some measures', bad: 'doubtful' }[grade] ?? 'not computed';
@@ -51,16 +53,21 @@ export async function draw(number, beside, sheet) {
     ...quality.measures.map(({ grade, name, words, advice }) => lists.element('li', { className: grade },
       lists.element('b', { textContent: grade }), ` ${name}: ${words}${advice ? `. ${advice}` : ''}`)),
     ...warnings.map(words => lists.element('li', { className: 'look' }, lists.element('b', { textContent: 'warning' }), ` ${words}`)),
+    ...alike ? [] : [lists.element('li', { className: 'look' }, lists.element('b', { textContent: 'look' }),
+      ` job ${beside.job} has other units than job ${number}, so what is not in the same unit is not compared`)],
     lists.element('li', { textContent: `bolide ${origin.version}, ${origin.date}, ${origin.deck}, on ${origin.machine}` }));
   const tell = v => v === undefined ? '–' : lists.number(v, 6);
-  const list = rows(sheet, [one, other].filter(Boolean)).map(([name, of]) => {
+  const list = rows([one, other].filter(Boolean)).map(([name, unit, of]) => {
     const values = [one, other].filter(Boolean).map(of);
-    if (!other) return [name, tell(values[0])];
+    const own = unit && other && [chosen, beside].map(run => unit(run.sheet.units));
+    if (own && own[0] !== own[1]) return [name, ...values.map((v, i) => `${tell(v)} ${own[i]}`), ''];
+    const heading = unit ? `${name} (${unit(chosen.sheet.units)})` : name;
+    if (!other) return [heading, tell(values[0])];
     const [a, b] = values, change = a === b ? 'equal' : a && b !== undefined ? `${lists.number(100 * (b - a) / Math.abs(a), 3)} %` : '';
-    return [name, tell(a), tell(b), change];
+    return [heading, tell(a), tell(b), change];
   });
   if (other) list.push(['digest', one.digest, other.digest, one.digest === other.digest ? 'equal' : 'differs']);
-  lists.table($('measured-head'), [other ? ['measure', `job ${number}`, `job ${beside}`, 'change'] : ['measure', `job ${number}`]], 'th');
+  lists.table($('measured-head'), [other ? ['measure', `job ${number}`, `job ${beside.job}`, 'change'] : ['measure', `job ${number}`]], 'th');
   lists.table($('measured'), list);
 }
 

@@ -93,8 +93,11 @@ async function load(run, index) {
   return kept;
 }
 
-/// The state of a run that is nearest to a time.
-function nearest(run, time) {
+/// Seconds of the units of time.
+const SECONDS = { s: 1, ms: 1e-3, us: 1e-6 };
+/// The state of a run that is nearest to a time of the chosen run, which may have another unit.
+function nearest(run, moment) {
+  const units = [runs[0], run].map(one => SECONDS[one.sheet.units.time] ?? 1), time = moment * (units[0] / units[1]);
   let best = 0;
   run.sheet.states.forEach((state, i) => { if (Math.abs(state.time - time) < Math.abs(run.sheet.states[best].time - time)) best = i; });
   return best;
@@ -134,7 +137,10 @@ function paint() {
   const shown = runs.filter(run => run.surface);
   if (!shown.length) return;
   const name = $('field').value, index = run => run.surface.fields.findIndex(field => field.name === name);
-  const ranges = shown.filter(run => index(run) >= 0 && run.surface.faces).map(run => run.surface.ranges[index(run)]);
+  const unitOf = run => run.surface.fields[index(run)]?.unit;
+  // A run in other units has a range of its own: numbers of the two are not comparable.
+  const alike = run => !runs[0].surface || unitOf(run) === unitOf(runs[0]);
+  const ranges = shown.filter(run => index(run) >= 0 && run.surface.faces && alike(run)).map(run => run.surface.ranges[index(run)]);
   let range = [Math.min(...ranges.map(r => r[0])), Math.max(...ranges.map(r => r[1]))];
   if (!ranges.length) range = [0, 1];
   else {
@@ -157,13 +163,14 @@ function paint() {
     if (!run?.surface) return;
     Object.assign(canvas, { mirrors: mirrorsOf(run), edges: $('edges').checked });
     if (canvas.map !== $('map').value) canvas.colours($('map').value);
-    canvas.show(run.surface, index(run), range);
+    canvas.show(run.surface, index(run), alike(run) || index(run) < 0 ? range : run.surface.ranges[index(run)]);
   });
   const unit = runs[0].surface.fields.find(field => field.name === name)?.unit;
   const byPart = index(runs[0]) < 0;
   $('low').textContent = byPart ? '' : lists.number(range[0], 3);
   $('high').textContent = byPart ? '' : lists.number(range[1], 3);
-  $('what').textContent = byPart ? 'coloured by part' : named(name) + (unit ? ` (${unit})` : '');
+  $('what').textContent = byPart ? 'coloured by part' : named(name) + (unit ? ` (${unit})` : '')
+    + (shown.every(run => index(run) < 0 || alike(run)) ? '' : '; the other run has other units, and colours over its own range');
   $('ramp').hidden = byPart;
 }
 
