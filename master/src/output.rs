@@ -45,6 +45,7 @@ pub struct Output {
     owners: Option<Arc<[u32]>>,
     bar: Option<ProgressBar>,
     started: Instant,
+    begun: Begun,
     last_line: Instant,
     /// Length of the history before its first row and after each (bytes).
     row_ends: Vec<u64>,
@@ -89,6 +90,7 @@ impl Output {
             owners: None,
             bar,
             started: Instant::now(),
+            begun: Begun::default(),
             last_line: Instant::now(),
         })
     }
@@ -124,6 +126,7 @@ impl Output {
     /// # Errors
     /// What the disk refused.
     pub fn go_on(&mut self, job: &Job, states: Option<WrittenStates>) -> Result<(), String> {
+        self.begun = Begun::at(&self.model, job.start_state());
         for row in job.rows_before() {
             self.row(row)?;
         }
@@ -226,7 +229,7 @@ impl Output {
         }
         self.last_line = now;
         let elapsed = now.duration_since(self.started).as_secs_f64();
-        let (line, share) = progress_line(&self.model, &progress, elapsed);
+        let (line, share, _) = progress_line(&self.model, &progress, self.begun, elapsed);
         match &self.bar {
             Some(bar) => {
                 bar.set_position((share * 1000.0) as u64);
@@ -244,21 +247,49 @@ impl Output {
     }
 }
 
-/// How far a run is, in words and as a share of the whole, `elapsed` seconds after its start. The time left comes first, up to a comma.
-pub fn progress_line(model: &Model, progress: &Progress, elapsed: f64) -> (String, f64) {
+/// Where a session of a run began: what was computed before says nothing of its pace.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Begun {
+    pub cycle: u64,
+    /// Part of the whole (0 to 1).
+    pub share: f64,
+}
+
+impl Begun {
+    /// At a state of a run.
+    pub fn at(model: &Model, state: &GlobalState) -> Self {
+        Self { cycle: state.cycle, share: share(model, state.time, state.cycle) }
+    }
+
+    /// Seconds to the end of a run that is so far `elapsed` seconds after it began here; none before it is farther than it was then.
+    pub fn left(&self, share: f64, elapsed: f64) -> Option<f64> {
+        let left = elapsed * (1.0 - share) / (share - self.share);
+        Some(left).filter(|left| share > self.share && left.is_finite())
+    }
+}
+
+/// The part of a run that is computed at a time or after so many cycles (0 to 1).
+fn share(model: &Model, time: f64, cycle: u64) -> f64 {
     let control = &model.setup.control;
-    let share =
-        (progress.time / control.end_time).max(progress.cycle as f64 / control.end_cycle as f64).min(1.0);
+    (time / control.end_time).max(cycle as f64 / control.end_cycle as f64).clamp(0.0, 1.0)
+}
+
+/// How far a run is, in words, and the seconds to its end, `elapsed` seconds after it began. The time left comes first, up to a comma.
+pub fn progress_line(
+    model: &Model,
+    progress: &Progress,
+    begun: Begun,
+    elapsed: f64,
+) -> (String, f64, Option<f64>) {
+    let share = share(model, progress.time, progress.cycle);
     let limit = match (progress.limit, progress.element) {
         (Limit::Courant, Some(element)) => format!("element {element}"),
         (limit, _) => format!("{limit:?}").to_lowercase(),
     };
-    let left = match share > 0.0 {
-        true => format!("{} left", span(elapsed * (1.0 - share) / share)),
-        false => "starting".to_owned(),
-    };
+    let left_s = begun.left(share, elapsed);
+    let left = left_s.map_or_else(|| "starting".to_owned(), |left| format!("{} left", span(left)));
     let unit = results::Units::named(&model.units).time;
-    let rate = progress.cycle as f64 / elapsed.max(1e-3);
+    let rate = progress.cycle.saturating_sub(begun.cycle) as f64 / elapsed.max(1e-3);
     let line = format!(
         "{left}, {:.1} %, cycle {}, t {:.4e} {unit}, step {:.2e} {unit} by {limit}, {rate:.0} cycles/s",
         100.0 * share,
@@ -266,7 +297,7 @@ pub fn progress_line(model: &Model, progress: &Progress, elapsed: f64) -> (Strin
         progress.time,
         progress.dt
     );
-    (line, share)
+    (line, share, left_s)
 }
 
 /// A time that a person waits for.
@@ -323,5 +354,36 @@ impl Sink for Output {
             | Action::Proved(_)
             | Action::Over(_) => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_left_is_reckoned_from_what_was_computed_since_a_run_went_on() {
+        let text = include_str!("../../tests/decks/plates-small.toml");
+        let model = deck::read(text, "small").expect("without faults");
+        let end = model.setup.control.end_time;
+        let begun = Begun { cycle: 700, share: share(&model, 0.5 * end, 700) };
+        let at = |share: f64, cycle| Progress {
+            time: share * end,
+            cycle,
+            dt: 1.0,
+            limit: Limit::Courant,
+            element: None,
+        };
+        // A tenth in ten seconds: forty are left for the other four, and not the seven that half of it in ten would make.
+        let (line, share, left) = progress_line(&model, &at(0.6, 900), begun, 10.0);
+        assert!(
+            (share - 0.6).abs() < 1e-12 && left.is_some_and(|left| (left - 40.0).abs() < 1e-6),
+            "{left:?}"
+        );
+        assert!(line.starts_with("40 s left, 60.0 %") && line.ends_with("20 cycles/s"), "{line}");
+        // A rewind to before it, and the very start.
+        assert!(progress_line(&model, &at(0.4, 600), begun, 10.0).0.starts_with("starting, "));
+        assert_eq!(begun.left(0.5, 0.0), None);
+        assert_eq!(Begun::default().left(0.5, 10.0), Some(10.0));
     }
 }

@@ -28,7 +28,7 @@ use crate::{
     job::Job,
     notice::Notice,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
-    output::{Output, progress_line},
+    output::{Begun, Output, progress_line},
     patches, picture,
     queue::Change,
     results::{self, Folder, Summary, TRACE, formats, report, summary::Origin, trace},
@@ -199,9 +199,11 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     let results = output.folder.as_ref().map(|folder| folder.path().to_owned());
     output.keeper = Some(Keeper::start(store, interval, job.start_state().cycle, results)?);
     output.go_on(&job, states)?;
-    let job_view = order.board.as_ref().map(|board| board.begin(order.number, &model));
+    let begun = Begun::at(&model, job.start_state());
+    let job_view = order.board.as_ref().map(|board| board.begin(order.number, &model, begun));
     if let Some(job_view) = &job_view {
         let mut job_view = board::lock(job_view);
+        job_view.rewind(job.start_state().cycle);
         job.rows_before().iter().for_each(|row| job_view.row(row));
         job_view.state(&model, job.start_state());
     }
@@ -214,6 +216,7 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
         model: &model,
         status: &order.status,
         started,
+        begun,
         last: None,
         job_view: job_view.clone(),
         notices: &order.notices,
@@ -287,6 +290,7 @@ struct Reporter<'a> {
     model: &'a Model,
     status: &'a watch::Sender<Status>,
     started: Instant,
+    begun: Begun,
     last: Option<Instant>,
     /// What the page shows.
     job_view: Option<Arc<Mutex<JobView>>>,
@@ -364,13 +368,12 @@ impl Sink for Reporter<'_> {
         }
         self.last = Some(now);
         let elapsed = now.duration_since(self.started).as_secs_f64();
-        let (line, share) = progress_line(self.model, &progress, elapsed);
-        let left = elapsed * (1.0 - share) / share;
+        let (line, _, left) = progress_line(self.model, &progress, self.begun, elapsed);
         self.status.send_modify(|status| {
             status.cycle = progress.cycle;
             status.time = progress.time;
             status.progress = line;
-            status.left_s = Some(left).filter(|left| left.is_finite());
+            status.left_s = left;
         });
         Ok(())
     }

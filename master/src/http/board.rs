@@ -21,6 +21,7 @@ use serde::Serialize;
 use super::surface::Skin;
 use crate::{
     event::{Deal, Progress, Proved},
+    output::Begun,
     results::{Units, history::HistoryRow},
 };
 
@@ -43,10 +44,14 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Board {
-    /// A view for a job that starts; the oldest goes when there are too many.
-    pub fn begin(&self, job: u32, model: &Model) -> Arc<Mutex<JobView>> {
-        let job_view = Arc::new(Mutex::new(JobView::new(model)));
+    /// A view for a job that starts, or goes on where it has begun: it keeps the surfaces of before. The oldest goes when there are too many.
+    pub fn begin(&self, job: u32, model: &Model, begun: Begun) -> Arc<Mutex<JobView>> {
         let mut job_views = lock(&self.0);
+        let mut job_view = JobView::new(model, begun);
+        if let Some(before) = job_views.get(&job) {
+            job_view.states = std::mem::take(&mut lock(before).states);
+        }
+        let job_view = Arc::new(Mutex::new(job_view));
         job_views.insert(job, Arc::clone(&job_view));
         while job_views.len() > SHEETS_LIMIT {
             job_views.pop_first();
@@ -164,6 +169,7 @@ pub struct JobView {
     end_time: f64,
     end_cycle: u64,
     started: Instant,
+    begun: Begun,
     brief: Brief,
     pace: VecDeque<(Instant, u64)>,
     points: Vec<Point>,
@@ -182,13 +188,14 @@ pub struct JobView {
 }
 
 impl JobView {
-    fn new(model: &Model) -> Self {
+    fn new(model: &Model, begun: Begun) -> Self {
         let control = &model.setup.control;
         Self {
             units: Units::named(&model.units),
             end_time: control.end_time,
             end_cycle: control.end_cycle,
             started: Instant::now(),
+            begun,
             brief: Brief { elements: model.mesh.n_elements(), ..Brief::default() },
             pace: VecDeque::new(),
             points: Vec::new(),
@@ -289,7 +296,7 @@ impl JobView {
         let (from, cycle) = self.pace[0];
         let passed = now.duration_since(from).as_secs_f64();
         self.brief.share = share;
-        self.brief.eta_s = (share > 0.0).then(|| elapsed * (1.0 - share) / share);
+        self.brief.eta_s = self.begun.left(share, elapsed);
         self.brief.dt = progress.dt;
         if passed > 0.0 {
             self.brief.rate = progress.cycle.saturating_sub(cycle) as f64 / passed;
@@ -442,7 +449,7 @@ mod tests {
 
     fn job_view() -> JobView {
         let text = include_str!("../../../tests/decks/plates-small.toml");
-        JobView::new(&deck::read(text, "small").expect("without faults"))
+        JobView::new(&deck::read(text, "small").expect("without faults"), Begun::default())
     }
 
     fn frame(cycle: u64, compute_ns: u64) -> ToMaster {
@@ -461,6 +468,24 @@ mod tests {
         assert!(job_view.points.last().is_some_and(|p| p.cycle > 9 * POINTS_LIMIT as u64));
         job_view.rewind(100);
         assert!(job_view.points.iter().all(|point| point.cycle <= 100));
+    }
+
+    #[test]
+    fn a_job_that_goes_on_keeps_its_surfaces_and_its_pace_is_that_since_then() {
+        let text = include_str!("../../../tests/decks/plates-small.toml");
+        let model = deck::read(text, "small").expect("without faults");
+        let board = Board::default();
+        let kept = |cycle| Kept { cycle, time: 0.0, bytes: Arc::default() };
+        lock(&board.begin(1, &model, Begun::default())).states = vec![kept(0), kept(20), kept(40)];
+        let again = board.begin(1, &model, Begun { cycle: 30, share: 0.5 });
+        let mut again = lock(&again);
+        again.rewind(30);
+        assert_eq!((again.states.len(), again.brief.states), (2, 2));
+        again.started = Instant::now().checked_sub(Duration::from_secs(10)).expect("long after the start");
+        let time = 0.6 * model.setup.control.end_time;
+        let limit = crate::event::Limit::Courant;
+        again.progress(&Progress { cycle: 40, time, dt: 1.0, element: None, limit });
+        assert!(again.brief.eta_s.is_some_and(|left| (40.0..41.0).contains(&left)), "{:?}", again.brief);
     }
 
     #[test]
