@@ -195,3 +195,42 @@ def test_a_keyword_deck_runs_from_its_file() -> None:
 def test_a_folder_without_results_is_told() -> None:
     with pytest.raises(bo.BolideError, match="no results"):
         bo.Result("nowhere")
+
+
+def test_a_run_without_a_summary_knows_its_parts_by_its_states(result: bo.Result, tmp_path: Path) -> None:
+    folder = tmp_path / "killed"
+    shutil.copytree(result.folder, folder)
+    (folder / "summary.json").unlink()
+    killed = bo.Result(folder)
+    state = killed.mesh(-1)
+    assert state.part_names == ["ball", "plate"]
+    assert state.part("plate").n_cells == result.mesh(-1).part("plate").n_cells > 0
+    assert killed.picture(parts=["plate"]).path.stat().st_size > 0
+    with pytest.raises(bo.BolideError, match="no digest; a run has one when it is over"):
+        _ = killed.digest
+    with pytest.raises(bo.BolideError, match="no part 'plat'"):
+        state.part("plat")
+
+
+def test_ten_node_tetrahedra_are_mirrored_with_positive_volumes(tmp_path: Path) -> None:
+    corners = [(0, 0, 0), (10, 0, 0), (0, 10, 0), (0, 0, 10)]
+    edges = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
+    points = [*corners, *(tuple((corners[a][i] + corners[b][i]) / 2 for i in range(3)) for a, b in edges)]
+    lines = [f"{n} {x} {y} {z}" for n, (x, y, z) in enumerate(points, start=1)]
+    element = " ".join(str(n) for n in range(1, 11))
+    mesh = tmp_path / "tet.mesh"
+    mesh.write_text("\n".join(["bolide mesh 1", "nodes 10", *lines, 'solids 1 "tet"', f"1 {element}"]) + "\n")
+    deck = tmp_path / "tet.toml"
+    deck.write_text(
+        'title = "tet"\nunits = "mm-ms-kg"\n[control]\nend_time = 0.0001\n[[part]]\nname = "tet"\n'
+        'material = "STEEL_1006"\nvelocity = [0, 0, -50]\nmesh = { file = "tet.mesh" }\n'
+    )
+    whole = bo.run(deck, progress=False).mesh(0).mirror("x")
+    assert whole.n_cells == 2
+    volumes = whole.compute_cell_sizes()["Volume"]
+    assert volumes == pytest.approx([1000 / 6, 1000 / 6])
+    # Nodes amid edges lie amid the corners of their own cell.
+    order = whole.cells_dict[24]
+    for cell in order:
+        for node, (a, b) in zip(cell[4:], edges, strict=True):
+            assert whole.points[node] == pytest.approx((whole.points[cell[a]] + whole.points[cell[b]]) / 2)

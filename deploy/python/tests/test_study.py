@@ -52,3 +52,15 @@ def test_faults_at_any_point_come_before_anything_runs() -> None:
     deck.cylinder("bar", "CU_OFHC", radius=2, length=length, cell=1, velocity=(0, 0, -100))
     with pytest.raises(bo.DeckError, match="length"):
         _ = bo.study(deck, length=[10, -1]).table
+
+
+def test_a_run_that_fails_leaves_the_others_their_rows() -> None:
+    study = bo.study(ball_on_plate(), speed=[100, 200, 300], measures={"ratio": "1 / (speed - 200)"})
+    with pytest.warns(UserWarning, match=r"1 of 3 runs failed.*\n.*speed = 200: measure ratio"):
+        table = study.table
+    assert list(table["state"]) == ["done", "failed", "done"]
+    assert table["ratio"].isna().tolist() == [False, True, False]
+    assert table["ratio"][0] == -0.01
+    deck = ball_on_plate()
+    with pytest.warns(UserWarning, match="runs failed"), pytest.raises(bo.StudyError, match="a run failed at speed = 200"):
+        bo.study(deck, speed=[100, 200], measures={"ratio": "1 / (speed - 200)"}).threshold("ratio", 1)

@@ -212,9 +212,11 @@ impl<'a> Course<'a> {
                     Ok(prepared) => {
                         self.ready.insert(point.clone(), Arc::new(prepared));
                     }
-                    Err(why) => {
-                        self.put(point.clone(), Outcome::Failed(why.to_string()), "its deck is faulty")
-                    }
+                    Err(why) => self.put(
+                        point.clone(),
+                        Outcome::Failed(format!("its deck is faulty: {why}")),
+                        "failed",
+                    ),
                 }
             }
             let mut answered = false;
@@ -290,6 +292,8 @@ impl<'a> Course<'a> {
             }
             Outcome::Failed(why) => why.clone(),
         };
+        // A run whose measure has no value counts as failed, however its results came.
+        let how = if matches!(outcome, Outcome::Failed(_)) { "failed" } else { how };
         tell(&format!("{at}{sample}: {told} ({how})"));
         self.outcomes.insert(point, outcome);
     }

@@ -133,6 +133,8 @@ class Result:
     @property
     def digest(self) -> str:
         """The hash of the final state: equal digests mean equal bits."""
+        if "digest" not in self.summary:
+            raise BolideError(f"{self.folder}: no digest; a run has one when it is over")
         return str(self.summary["digest"])
 
     @property
@@ -276,7 +278,8 @@ class Result:
         for flag, value in options.items():
             arguments += [] if value is None else [f"--{flag}={value}"]
         arguments += [] if range is None else [f"--range={float(range[0])!r},{float(range[1])!r}"]
-        names = [part.name for part in self.parts]
+        # Of a run under way, the states have the names.
+        names = [part.name for part in self.parts] or (self.mesh(0).part_names if parts else [])
         for name in parts:
             if name not in names:
                 raise unknown("part", name, names)

@@ -22,6 +22,7 @@ MIRRORED = {
     pyvista.CellType.WEDGE: [0, 2, 1, 3, 5, 4],
     pyvista.CellType.PYRAMID: [0, 3, 2, 1, 4],
     pyvista.CellType.TETRA: [0, 2, 1, 3],
+    pyvista.CellType.QUADRATIC_TETRA: [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
     pyvista.CellType.QUAD: [0, 3, 2, 1],
     pyvista.CellType.TRIANGLE: [0, 2, 1],
     pyvista.CellType.LINE: [0, 1],
@@ -41,7 +42,9 @@ class State(pyvista.UnstructuredGrid):  # type: ignore[misc]
         """Reads a `.vtu` file of a run."""
         state = cls(pyvista.read(path))
         state.field_data[PLANES] = list(planes) or [""]
-        state.field_data[PARTS] = list(parts) or [""]
+        # A state has them itself; those of a caller are of a run that is over.
+        if parts:
+            state.field_data[PARTS] = list(parts)
         return state
 
     @property

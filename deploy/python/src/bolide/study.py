@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -71,11 +72,13 @@ class Study:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """A row for each run: parameters, measures, cycles and digest. Units are in `table.attrs["units"]`.
+        """A row for each run: parameters, measures, cycles, digest and state. Units are in `table.attrs["units"]`.
+
+        A run that fails has the state `failed` and no measures, and is warned of.
 
         Raises:
             DeckError: with every fault of the deck.
-            StudyError: if a run fails.
+            StudyError: if the study cannot be computed.
         """
         return self._compute("table", self._parameters(), None)
 
@@ -169,13 +172,23 @@ class Study:
         width = tolerance if tolerance is not None else TOLERANCE * (max(values) - min(values))
         wanted = {"kind": kind, "parameter": searched, "measure": self._measure(measure), "tolerance": width, **goal}
         found = self._compute("goal", self._parameters(searched), wanted)
+        doubtful = found["result"].str.contains("; ").sum()
+        if doubtful:
+            warnings.warn(
+                f"{measure}: {doubtful} of {len(found)} results rest on runs that may be too short; give the deck a later end_time",
+                stacklevel=3,
+            )
         if len(found) > 1:
             return found
         row = found.iloc[0]
         low, high, at = (row.get(f"{searched} {what}") for what in ("low", "high", "at"))
-        if at is None or low is None or high is None or pd.isna(at):
+        result, _, doubt = str(row["result"]).partition("; ")
+        if at is None or low is None or high is None or pd.isna(at) or pd.isna(low):
+            if at is not None and not pd.isna(at):
+                raise StudyError(f"{measure}: {result} at {searched} = {at:g}, which the search needs")
+            longer = f"; {doubt}: give the deck a later end_time" if doubt else ""
             raise StudyError(
-                f"{measure}: {row['result']} of {searched} from {min(values):g} to {max(values):g}; choose another range"
+                f"{measure}: {result} of {searched} from {min(values):g} to {max(values):g}; choose another range{longer}"
             )
         unit = found.attrs["units"].get(f"{searched} at", "")
         return Limit(searched, float(at), float(low), float(high), unit)
@@ -198,8 +211,12 @@ class Study:
             raise KeyboardInterrupt
         if done.returncode != 0:
             head, *lines = binary.reason_of(done.stderr).splitlines()
-            is_fault = re.match(r"\d+ faults? in ", head) is not None and lines
-            raise DeckError(lines) if is_fault else StudyError("\n".join([head, *lines]))
+            if re.match(r"\d+ of \d+ runs failed", head) is None:
+                is_fault = re.match(r"\d+ faults? in ", head) is not None and lines
+                raise DeckError(lines) if is_fault else StudyError("\n".join([head, *lines]))
+            # The tables are there, with what the others came to.
+            reasons = [line for line in done.stderr.splitlines() if line.endswith(" (failed)")]
+            warnings.warn("\n".join([head, *reasons]), stacklevel=4)
         rows = pd.read_csv(folder / f"{table}.csv", float_precision="round_trip")
         names = [split(column) for column in rows.columns]
         rows.columns = pd.Index([name for name, _ in names])
