@@ -168,10 +168,11 @@ fn skin_of(
         return Err(format!(
             "{}: nothing to draw{}",
             path.display(),
-            if parts.is_empty() {
-                ""
-            } else {
-                "; the field `part` of the states has the numbers of the parts"
+            match (parts.is_empty(), args.cut) {
+                (true, _) => "",
+                (false, None) => "; the field `part` of the states has the numbers of the parts",
+                (false, Some(_)) =>
+                    "; --cut goes through the middle of all parts and leaves nothing of these: leave it out",
             }
         ));
     }

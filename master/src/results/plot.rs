@@ -83,7 +83,7 @@ impl Plot {
             "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"{}><title>{}</title></polyline>",
             path.trim_end(),
             colour(index),
-            if index < COLOURS { "" } else { " stroke-dasharray=\"5 3\"" },
+            dash(index),
             escaped(&curve.name)
         );
     }
@@ -105,9 +105,25 @@ pub fn colour(index: usize) -> String {
     format!("var(--c{})", index % COLOURS)
 }
 
-/// Colour and name of a curve.
+/// Of curves of one colour, the first is solid and the others are dashed, each in its own way.
+fn dash(index: usize) -> &'static str {
+    match index / COLOURS % 4 {
+        0 => "",
+        1 => " stroke-dasharray=\"5 3\"",
+        2 => " stroke-dasharray=\"1.5 3\"",
+        _ => " stroke-dasharray=\"9 3 2 3\"",
+    }
+}
+
+/// Look and name of a curve.
 pub fn entry(index: usize, curve: &Curve) -> String {
-    format!("<span style=\"color:{}\">&#9644;</span> {}", colour(index), escaped(&curve.name))
+    format!(
+        "<svg style=\"width:22px;height:8px\" viewBox=\"0 0 22 8\" aria-hidden=\"true\"><line x2=\"22\" y1=\"4\" y2=\"4\" stroke=\"{}\" \
+         stroke-width=\"2\"{}/></svg> {}",
+        colour(index),
+        dash(index),
+        escaped(&curve.name)
+    )
 }
 
 /// Round numbers that lie between two, about five of them.

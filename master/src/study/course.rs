@@ -106,8 +106,9 @@ impl<'a> Course<'a> {
             let lines: Vec<String> = lines.collect();
             let n = wanted.len();
             return Err(format!(
-                "{} faults in the deck at {n_faulty} of {n} points\n{}",
+                "{} fault{} in the deck at {n_faulty} of {n} points\n{}",
                 faults.len(),
+                if faults.len() == 1 { "" } else { "s" },
                 lines.join("\n")
             ));
         }

@@ -19,6 +19,7 @@ use tracing::warn;
 
 use super::{
     cache::{Cache, FILES},
+    course,
     place::{Finished, Place, RunError, Task},
     plan::Study,
 };
@@ -81,10 +82,18 @@ impl<'a> Submitted<'a> {
         }
     }
 
+    /// What people see of a run in the queue: the values of its parameters, which tell it from the others, and the title of its deck.
+    fn study_title(&self, task: &Task) -> String {
+        let at = course::words(self.study, &task.point.values, None);
+        let sample =
+            if task.point.sample > 0 { format!(", sample {}", task.point.sample) } else { String::new() };
+        format!("{at}{sample}: {}", task.prepared.title)
+    }
+
     /// Puts a run into the queue, unless a job there already is that run.
     fn submit(&mut self, task: &Task) -> Result<u32, String> {
         let identity = &task.prepared.identity;
-        let title = title_of(&task.prepared.title, identity);
+        let title = title_of(&self.study_title(task), identity);
         let options = bundle::Options { title: Some(title.clone()), ..self.study.options_at(&task.point) };
         let text = deck_file::gather_deck(&self.study.deck, &options)?;
         let asked = JobOptions { keep_every: Some(KEEP_EVERY), ..JobOptions::default() };

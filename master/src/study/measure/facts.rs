@@ -68,7 +68,8 @@ impl PartFacts {
             let (a, b) = ((low - x) / way[axis], (high - x) / way[axis]);
             between = [between[0].max(a.min(b)), between[1].min(a.max(b))];
         }
-        between[0] < between[1]
+        // A flat sheet takes no time to pass.
+        between[0] <= between[1] && between[1] > 0.0
     }
 }
 

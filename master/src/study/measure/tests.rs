@@ -124,6 +124,12 @@ fn what_a_gauge_is_to_perforate_lies_before_it() {
     ] {
         assert_eq!(with(x, velocity), (Ok(()), Ok(())), "{x:?} {velocity:?}");
     }
+    // A sheet without thickness, at a slant.
+    let mut facts = facts();
+    facts.parts[1].low[2] = 0.0;
+    facts.gauges[0].x = [-4.0, 0.0, 3.0];
+    facts.gauges[0].velocity = [200.0, 0.0, -200.0];
+    assert_eq!(Formula::parse("perforated", &[]).expect("a phrase").check(&facts), Ok(()));
 }
 
 #[test]
