@@ -33,7 +33,9 @@ def test_a_study_has_a_row_for_each_value_and_finds_the_limit() -> None:
 
 def test_a_range_without_a_limit_says_so() -> None:
     study = bo.study(ball_on_plate(), speed=[10, 20])
-    with pytest.raises(bo.StudyError, match="perforated: reached at neither end of speed from 10 to 20"):
+    # The ball has hardly begun to move when these runs end.
+    none = "perforated: reached at neither end of speed from 10 to 20.*later end_time"
+    with pytest.warns(UserWarning, match="may be too short"), pytest.raises(bo.StudyError, match=none):
         study.v50()
 
 
