@@ -9,11 +9,14 @@ use mechanics::state::GlobalState;
 use crate::{
     embedded::Sink,
     event::{Action, Limit, Progress},
+    export,
     job::Job,
+    picture,
     queue::sum_of,
     results::{
-        self, Folder, INPUT,
+        self, Folder, INPUT, Summary, formats,
         history::{History, HistoryRow},
+        report,
         summary::Input,
         sums,
         vtu::Series,
@@ -25,6 +28,14 @@ use crate::{
 
 /// Cycle and time of states that an earlier session wrote, and the checksums of their files.
 pub type WrittenStates = (Vec<(u64, f64)>, Vec<[u8; 32]>);
+
+/// What became of the formats that a deck asks for.
+#[derive(Default)]
+pub struct OtherFormats {
+    /// A line for each that was written.
+    pub written: Vec<String>,
+    pub missing: usize,
+}
 
 /// Writes rows and states, shows progress.
 pub struct Output {
@@ -106,6 +117,32 @@ impl Output {
         results::write_whole(&folder.file(INPUT), write).map_err(|e| e.to_string())?;
         self.input = Some(Input { deck: sum_of(text), end_time });
         Ok(())
+    }
+
+    /// Writes the summary, the report, and the formats that the deck asks for. A format that cannot be written takes nothing from what was
+    /// computed: it is a warning of the summary.
+    ///
+    /// # Errors
+    /// What the disk refused.
+    pub fn write_summary(&self, summary: &mut Summary) -> Result<OtherFormats, String> {
+        let mut formats = OtherFormats::default();
+        let Some(folder) = &self.folder else { return Ok(formats) };
+        summary.write(folder).map_err(|e| e.to_string())?;
+        for written in formats::write_each(folder.path(), &self.model.output.formats) {
+            match written {
+                Ok(written) => formats.written.push(export::line(&written)),
+                Err(why) => {
+                    summary.warnings.push(why);
+                    formats.missing += 1;
+                }
+            }
+        }
+        if formats.missing > 0 {
+            summary.write(folder).map_err(|e| e.to_string())?;
+        }
+        let pictures = picture::of_report(folder.path(), summary);
+        report::write(folder, summary, &self.model.units, &pictures).map_err(|e| e.to_string())?;
+        Ok(formats)
     }
 
     /// Writes the checksums of a folder that is complete.

@@ -18,16 +18,14 @@ use crate::{
     deck_file::{gather_deck, read_gathered},
     embedded::{self, Traffic},
     event::{Outcome, WorkerSpec},
-    export,
     interrupt::stop_on_interrupt,
     job::Job,
     machine,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
-    picture,
     processes::Processes,
     refine,
-    results::{self, Folder, Summary, formats, report, summary::Origin, trace},
+    results::{self, Folder, Summary, summary::Origin, trace},
     shell::{print, quoted, tell},
     snapshot::{
         self, Snapshot,
@@ -298,24 +296,9 @@ pub fn conclude(
     let summary = summarise(model, census, outcome, traffic, threads, wall_s);
     let origin = Origin::of(&output.deck);
     let mut summary = Summary { input: output.input.clone(), origin, ..summary };
-    let mut missing = Vec::new();
-    if let Some(folder) = &output.folder {
-        summary.write(folder).map_err(|e| e.to_string())?;
-        // A format that cannot be written takes nothing from what was computed.
-        for written in formats::write_each(folder.path(), &model.output.formats) {
-            match written {
-                Ok(written) => info!("{}", export::line(&written)),
-                Err(why) => missing.push(why),
-            }
-        }
-        if !missing.is_empty() {
-            summary.warnings.extend(missing.iter().cloned());
-            summary.write(folder).map_err(|e| e.to_string())?;
-        }
-        let pictures = picture::of_report(folder.path(), &summary);
-        report::write(folder, &summary, &model.units, &pictures).map_err(|e| e.to_string())?;
-        output.seal()?;
-    }
+    let formats = output.write_summary(&mut summary)?;
+    formats.written.iter().for_each(|line| info!("{line}"));
+    output.seal()?;
     for warning in &summary.warnings {
         warn!("{warning}");
     }
@@ -331,7 +314,7 @@ pub fn conclude(
         (Some(reason), _) => Err(reason.clone()),
         _ if printed.is_err() => printed.map(|()| ExitCode::SUCCESS),
         (None, true) => Ok(ExitCode::from(130)),
-        (None, false) if !missing.is_empty() => Err("the run is complete, and so are its other results, but a format that was asked for is missing; bolide export writes it later".to_owned()),
+        (None, false) if formats.missing > 0 => Err("the run is complete, and so are its other results, but a format that was asked for is missing; bolide export writes it later".to_owned()),
         (None, false) => Ok(ExitCode::SUCCESS),
     }
 }

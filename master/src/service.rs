@@ -23,15 +23,14 @@ use crate::{
     drive::{self, Input, WorkerLink, drive},
     embedded::Sink,
     event::{Action, Deal, WorkerSpec},
-    export,
     http::board::{self, Board, JobView},
     job::Job,
     notice::Notice,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for},
     output::{Begun, Output, progress_line},
-    patches, picture,
+    patches,
     queue::Change,
-    results::{self, Folder, Summary, TRACE, formats, report, summary::Origin, trace},
+    results::{self, Folder, Summary, TRACE, summary::Origin, trace},
     snapshot::{Snapshot, keeper::Keeper, store::Store},
     summarise::{SurfaceCensus, summarise},
 };
@@ -240,27 +239,12 @@ fn run(order: &Order) -> Result<(Change, Ended), Failure> {
     let summary = summarise(&model, &census, &outcome, traffic, threads, wall);
     let mut summary =
         Summary { input: reporter.output.input.clone(), origin: Origin::of(&order.name), ..summary };
-    if let Some(folder) = &reporter.output.folder {
-        summary.write(folder).map_err(|e| e.to_string())?;
-        let before = summary.warnings.len();
-        // A format that cannot be written takes nothing from what was computed.
-        for written in formats::write_each(folder.path(), &model.output.formats) {
-            match written {
-                Ok(written) => info!(job = order.number, "{}", export::line(&written)),
-                Err(why) => summary.warnings.push(why),
-            }
-        }
-        if summary.warnings.len() > before {
-            summary.write(folder).map_err(|e| e.to_string())?;
-        }
-        let pictures = picture::of_report(folder.path(), &summary);
-        report::write(folder, &summary, &model.units, &pictures).map_err(|e| e.to_string())?;
-        if order.options.trace {
-            trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports)
-                .map_err(|e| e.to_string())?;
-        }
-        reporter.output.seal()?;
+    let formats = reporter.output.write_summary(&mut summary)?;
+    formats.written.iter().for_each(|line| info!(job = order.number, "{line}"));
+    if let (Some(folder), true) = (&reporter.output.folder, order.options.trace) {
+        trace::write(&folder.file(TRACE), &outcome.workers, &outcome.reports).map_err(|e| e.to_string())?;
     }
+    reporter.output.seal()?;
     for warning in &summary.warnings {
         warn!(job = order.number, "{warning}");
     }

@@ -28,23 +28,19 @@ pub fn write_all(folder: &Path, names: &[String]) -> Result<Vec<Written>, Error>
     names.iter().filter_map(|name| named(name)).map(|format| format.write(&states)).collect()
 }
 
-/// As [`write_all`], but one that cannot be written keeps none of the others away: a line of what was written, or of why it was not, for
-/// each.
+/// As [`write_all`], but one that cannot be written keeps none of the others away: for each what was written, or why it was not.
 pub fn write_each(folder: &Path, names: &[String]) -> Vec<Result<Written, String>> {
-    let states = match (names.is_empty(), States::of(folder)) {
-        (true, _) => return Vec::new(),
-        (false, states) => states,
-    };
+    if names.is_empty() {
+        return Vec::new();
+    }
+    let states = States::of(folder);
     let write = |format: &dyn Format| match &states {
         Ok(states) => format.write(states).map_err(|e| e.to_string()),
         Err(error) => Err(error.to_string()),
     };
-    let all = names.iter().filter_map(|name| named(name));
-    all.map(|format| {
-        write(format)
-            .map_err(|why| format!("format {} is missing, it cannot be written: {why}", format.name()))
-    })
-    .collect()
+    let missing = |name: &str, why| format!("format {name} is missing, it cannot be written: {why}");
+    let formats = names.iter().filter_map(|name| named(name));
+    formats.map(|format| write(format).map_err(|why| missing(format.name(), why))).collect()
 }
 
 #[cfg(test)]
