@@ -26,7 +26,7 @@ fn loses_what_is_booked(name: &str, sheet: Model) {
     println!("{name}: lost {lost:e} of {:e}, booked {:e}, error {worst:e}", first.kinetic, part.viscosity);
     assert!(lost > 0.1 * first.kinetic, "{name}: hardly damped");
     assert!((part.viscosity / lost - 1.0).abs() < 0.02, "{name}: {} booked, {lost} lost", part.viscosity);
-    assert!(worst < 0.005, "{name}: error {worst}");
+    assert!(worst < 0.01, "{name}: error {worst}");
 }
 
 #[test]

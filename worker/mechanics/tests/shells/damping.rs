@@ -49,7 +49,7 @@ fn a_free_sheet_loses_what_its_damping_books() {
             }
             println!("{in_plane:?}, {name}: heat {:.4} of the energy, error {worst:.2e}", heat / first);
             assert!(heat > 0.1 * first, "{in_plane:?}, {name}: hardly damped, {heat} of {first}");
-            assert!(worst < 5e-3, "{in_plane:?}, {name}: error {worst}");
+            assert!(worst < 1e-2, "{in_plane:?}, {name}: error {worst}");
         }
     }
 }
