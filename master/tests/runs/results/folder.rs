@@ -15,13 +15,17 @@ use super::{dented, plates, row, scratch, summary};
 fn folder_with_content_is_refused_without_force_and_loses_only_results_with_it() {
     let path = scratch("folder");
     let folder = Folder::create(&path, false).expect("did not exist");
-    Folder::create(&path, false).expect("empty");
+    let error = Folder::create(&path, true).expect_err("a run has it");
+    assert!(matches!(&error, Error::Taken { path: named } if *named == path), "{error:?}");
+    drop(folder);
+    let folder = Folder::create(&path, false).expect("empty");
     for name in ["state-000000.vtu", ".state-000001.vtu.tmp", "results.pvd", "history.csv", "summary.json"] {
         fs::write(folder.file(name), "old").expect("writable");
     }
     for name in ["notes.txt", "state-mine.vtu"] {
         fs::write(folder.file(name), "mine").expect("writable");
     }
+    drop(folder);
     let error = Folder::create(&path, false).expect_err("not empty");
     assert!(matches!(&error, Error::NotEmpty { path: named } if *named == path), "{error:?}");
     assert!(error.to_string().contains("--force") && error.to_string().contains("folder"), "{error}");

@@ -82,7 +82,8 @@ fn history_that_goes_back_and_repeats_its_rows_is_the_same_file() {
 
     // A master that was killed in a row, and starts again from its snapshot.
     fs::write(&path, [&whole[..], b"4,0.1,0."].concat()).expect("writable");
-    let folder = Folder::reopen(folder.path()).expect("exists");
+    drop(folder);
+    let folder = Folder::reopen(path.parent().expect("a folder")).expect("exists");
     let mut history = History::open(&folder, &model, kept).expect("long enough");
     for cycle in 1..4 {
         history.append(&row(&model, cycle)).expect("written");
