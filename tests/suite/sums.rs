@@ -118,7 +118,7 @@ fn energies_add_up_wherever_they_are_shown() {
         }
         let mut shown = legend(&page);
         shown.retain(|(name, _)| name != "external work");
-        let (name, total) = shown.pop().expect("a total");
+        let (name, total) = shown.pop().unwrap_or_else(|| panic!("{}: no total", path.display()));
         assert_eq!(name, "total", "{}: {shown:?}", path.display());
         // Six digits are printed.
         adds_up(&shown.iter().map(|(_, value)| *value).collect::<Vec<_>>(), total, 2e-5, "report");
