@@ -42,7 +42,7 @@ fn documented() -> Vec<String> {
 /// What the legend of the report's first plot says last: name and number.
 fn legend(page: &str) -> Vec<(String, f64)> {
     let plot = page.split("<h2>").nth(1).expect("a plot of energies");
-    plot.split("&#9644;</span> ")
+    plot.split("/></svg> ")
         .skip(1)
         .map(|entry| {
             let (name, rest) = entry.split_once(" <small>").expect("a name");
