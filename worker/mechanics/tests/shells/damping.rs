@@ -12,7 +12,7 @@ const DT: f64 = 1e-6;
 #[test]
 fn a_free_sheet_loses_what_its_damping_books() {
     let (x, corners) = grid(4, 4, |s, t| [0.04 * s, 0.04 * t, 0.0]);
-    let rows = |n: usize| [if n % 5 % 2 == 0 { 10.0 } else { -10.0 }, 0.0, 0.0];
+    let rows = |n: usize| [if (n % 5).is_multiple_of(2) { 10.0 } else { -10.0 }, 0.0, 0.0];
     let all = |n: usize| [2, 3, 5].map(|a| 2.0 * ((n * n * a + 7 * n + a) % 11) as f64 - 10.0);
     for in_plane in IN_PLANE {
         for (name, velocity) in [("rows", &rows as &dyn Fn(usize) -> [f64; 3]), ("all modes", &all)] {
