@@ -35,6 +35,9 @@ use crate::{
     summarise::{SurfaceCensus, summarise},
 };
 
+/// Seconds between snapshots of a run that asks for no other.
+const SNAPSHOT_SECONDS: f64 = 60.0;
+
 /// Where a run writes: `--out`, or the folder it resumes from, or `results/<deck name>`.
 pub fn folder_for(args: &RunArgs) -> PathBuf {
     let resumed = args.resume.clone().filter(|path| path.is_dir());
@@ -95,7 +98,8 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
         .map(|(i, speed)| WorkerSpec::new(format!("worker-{i}"), speed, threads as u32))
         .collect();
     let path = (!asked.no_output).then(|| folder_for(args));
-    let interval = interval_for(asked, &model, None);
+    let interval = interval_for(asked, &model, path.as_ref().map(|_| SNAPSHOT_SECONDS));
+    let asks_for_snapshots = !interval_for(asked, &model, None).is_never();
     if !interval.is_never() && path.is_none() {
         return Err("snapshots need a results folder; leave out --no-output".to_owned());
     }
@@ -175,6 +179,9 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     let total_threads = (n * threads) as u32;
     let ended = conclude(&model, &census, &outcome, traffic, total_threads, wall, &output, args.json)?;
     traced.transpose().map_err(|e| e.to_string())?;
+    if !asks_for_snapshots && !outcome.stopped && outcome.failure.is_none() {
+        forget_snapshots(output)?;
+    }
     Ok(ended)
 }
 
@@ -236,6 +243,13 @@ fn say_what_is_missing(snapshot: &Snapshot, folder: &Path) {
     }
 }
 
+/// What a run that is over has stored for itself alone.
+fn forget_snapshots(output: Output) -> Result<(), String> {
+    let Output { keeper, folder, .. } = output;
+    drop(keeper);
+    folder.map_or(Ok(()), |folder| store::remove(&folder.file(store::FOLDER)))
+}
+
 /// After an interrupt: the command that goes on.
 fn say_how_to_resume(keeper: &Keeper, output: &Output) {
     let kept = keeper.flush();
@@ -256,9 +270,9 @@ fn say_what_is_stored(output: &Output) {
         Some(cycle) => {
             tell(&format!("stored at cycle {cycle}; go on with: {}", resuming_command(folder.path())))
         }
-        None => tell(
-            "nothing is stored to go on from; with --snapshot-every SECONDS a run is stored while it goes",
-        ),
+        None => tell(&format!(
+            "nothing is stored to go on from; a run is stored every {SNAPSHOT_SECONDS} s, with --snapshot-every SECONDS more often"
+        )),
     }
 }
 

@@ -203,7 +203,7 @@ pub struct JobOptions {
     #[serde(default)]
     pub verify: f64,
     /// Write a checkpoint to disk every this many seconds, for --resume; 0 for never [default: the deck's; else a
-    /// master's jobs every 10, `run` only when it is interrupted]
+    /// master's jobs every 10, `run` every 60]
     #[arg(long, help_heading = ADVANCED, value_name = "SECONDS", value_parser = seconds)]
     pub snapshot_every: Option<f64>,
     /// The same every this many cycles

@@ -112,8 +112,11 @@ pub fn interrupted(bolide: &Path, deck: &Path, cycles: u64) {
     until(|| format!("ten states; {}", run.text()), || begun.is_file().then_some(()));
     run.signal("INT");
     assert_eq!(run.wait().code(), Some(130), "{}", run.text());
+    let snapshots = folder.path().join("cut/snapshots");
+    assert!(snapshots.is_dir(), "{}", run.text());
     let resumed = summary(command("--resume", "cut"));
     Left::of(&folder.path().join("cut"), &resumed).assert_same(&undisturbed);
+    assert!(!snapshots.exists(), "nobody asked for snapshots, and the run is over");
 }
 
 pub(super) fn skipped() -> Seen {
