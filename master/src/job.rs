@@ -345,7 +345,7 @@ impl Job {
         let start = Arc::clone(&self.checkpoints.newest().state);
         let vote = self.epoch.inflow.vote_before().ok_or(Error::NoVote)?;
         let (problem, walls) = (&self.problem, &self.account.walls);
-        let Step { dt, time, quantum } = self.epoch.schedule.first_step(start.time, &control, || {
+        let Step { dt, time, quanta } = self.epoch.schedule.first_step(start.time, &control, || {
             if let Some(fault) = vote.fault {
                 return Err(Error::Element(element_fault(problem, fault, 0)));
             }
@@ -364,7 +364,7 @@ impl Job {
             dt: 0.0,
             time,
             walls: self.account.walls.clone(),
-            force_quantum: quantum,
+            quanta,
             gather: blocking,
             blocking,
             collect: store || at_end,
@@ -434,12 +434,12 @@ impl Job {
         if gather {
             self.epoch.sorts.gather_at(after, blocking, u64::from(control.sort_lag));
         }
-        let (walls, force_quantum) = (self.account.walls.clone(), self.epoch.schedule.quantum());
+        let (walls, quanta) = (self.account.walls.clone(), self.epoch.schedule.quanta());
         let sample = (keep || stop) && self.options.replay;
         if stop && sample {
             self.epoch.schedule.sample_stop();
         }
-        Orders { next, dt, time, walls, force_quantum, gather, blocking, collect, stop, sample }
+        Orders { next, dt, time, walls, quanta, gather, blocking, collect, stop, sample }
     }
 
     /// Plan boundaries are the cycles at which plans begin to act, and at latest every so many.
@@ -531,7 +531,7 @@ impl Job {
         let (dt, limit, element) = step_after(&self.problem, walls, &vote, (known, now));
         let next = self.epoch.schedule.order_after(cycle, now, (dt, limit), &control);
         self.account.check_floor(&self.problem, (cycle + 1, next.dt), next.limit, element);
-        self.epoch.schedule.rescale(&vote)?;
+        self.epoch.schedule.rescale(&vote, self.problem.mass)?;
         self.account.move_walls(&self.problem, &vote, now.dt)?;
         let times = [next.time, next.time_after];
         let orders = self.orders_for(cycle + 1, next.dt, times, Some(&vote), actions);

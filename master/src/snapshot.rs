@@ -9,7 +9,7 @@ pub mod store;
 
 use std::sync::Arc;
 
-use mechanics::{exact::Quantum, rigid::switch::Formed, state::GlobalState, vote::Vote, wall::Pose};
+use mechanics::{exact::Quanta, rigid::switch::Formed, state::GlobalState, vote::Vote, wall::Pose};
 use serde::{Deserialize, Serialize};
 
 pub use file::{read, write};
@@ -27,8 +27,8 @@ pub struct Snapshot {
     pub dt_previous: f64,
     /// `dt` of the cycle to come (time).
     pub dt: f64,
-    /// Quantum of forces in the cycle to come, and from the one after it on.
-    pub force_quanta: [Quantum; 2],
+    /// Quanta of the sums of the cycle to come, and from the one after it on.
+    pub quanta: [Quanta; 2],
     /// Rate at which bodies moved against each other (length per cycle), for the sorts to come.
     pub spread_rate: f64,
     /// The whole vote of the cycle before, still to take effect.

@@ -36,7 +36,7 @@ use std::fmt;
 /// 19: pieces travel before the assignment or state that they belong to.
 /// 20: workers may name the region that they are in.
 /// 21: workers that sort make their plans among themselves.
-pub const VERSION: u16 = 21;
+pub const VERSION: u16 = 22;
 
 /// Most characters of a host's name.
 pub const NAME_LIMIT: usize = 64;

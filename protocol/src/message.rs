@@ -16,7 +16,7 @@
 use mechanics::{
     contact::{Census, PartBox, Patch, PlacedPatch},
     cycle::{Plan, Standing, Subdomain},
-    exact::{Quanta, Quantum},
+    exact::Quanta,
     piece::Piece,
     rigid,
     setup::Setup,
@@ -353,8 +353,8 @@ pub struct Orders {
     pub time: f64,
     /// Poses of the walls of finite mass in cycle `next`, in the order of the walls.
     pub walls: Vec<Pose>,
-    /// Quantum of forces from cycle `next + 1` on.
-    pub force_quantum: Quantum,
+    /// Quanta of the sums from cycle `next + 1` on.
+    pub quanta: Quanta,
     /// At the start of cycle `next + 1`, the positions of surface nodes travel; the plan sorted from them acts a sort
     /// lag later.
     pub gather: bool,

@@ -195,8 +195,8 @@ impl Machine {
             Task::Transfer { nodes } => {
                 Outcome::Transferred(laps.time(Phase::Other, || domain.transfer(&nodes))?)
             }
-            Task::Elements { dt_previous, quantum, time } => {
-                domain.begin(quantum, time);
+            Task::Elements { dt_previous, quanta, time } => {
+                domain.begin(quanta, time);
                 laps.time(Phase::Interior, || domain.elements(Sets::All, dt_previous, clock));
                 Outcome::Computed
             }
@@ -215,10 +215,10 @@ impl Machine {
                     Ok::<_, String>(Outcome::Forces { partials: domain.partials(clock), gathered })
                 })?
             }
-            Task::Border { dt_previous, quantum, time, gather, blocking } => {
+            Task::Border { dt_previous, quanta, time, gather, blocking } => {
                 let gathered = laps.time(Phase::Contact, || {
                     let gathered = gathered(domain, gather, blocking, clock);
-                    domain.begin(quantum, time);
+                    domain.begin(quanta, time);
                     domain.contact(dt_previous, clock);
                     gathered
                 });

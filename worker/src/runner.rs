@@ -374,7 +374,7 @@ mod tests {
             dt: 1.0,
             time: 0.0,
             walls: Vec::new(),
-            force_quantum: quantum,
+            quanta: mechanics::exact::Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
             gather: false,
             blocking: false,
             collect: false,

@@ -14,7 +14,7 @@ mod tree;
 
 use std::collections::{BTreeMap, VecDeque};
 
-use mechanics::{cycle::Neighbour, exact::Quantum, piece::Piece, vote::Vote};
+use mechanics::{cycle::Neighbour, exact::Quanta, piece::Piece, vote::Vote};
 use protocol::{
     message::{Assign, Orders, ToMaster, ToWorker, WORKER_STATE_VERSION, at_once},
     options::Route,
@@ -111,7 +111,6 @@ pub struct Session {
     sort_lag: u64,
     dt_previous: f64,
     dt: f64,
-    quantum: Option<Quantum>,
     /// Orders by the cycle whose step they give.
     orders: BTreeMap<u64, Orders>,
     totals: VecDeque<(u64, Vec<f64>)>,
@@ -165,7 +164,6 @@ impl Session {
             sort_lag: 0,
             dt_previous: 0.0,
             dt: 0.0,
-            quantum: None,
             orders: BTreeMap::new(),
             totals: VecDeque::new(),
             boundaries: VecDeque::new(),
@@ -328,7 +326,6 @@ impl Session {
                 self.first_cycle = assign.cycle;
                 self.dt_previous = assign.dt_previous;
                 self.sort_lag = u64::from(assign.setup.control.sort_lag);
-                self.quantum = Some(assign.quanta.force);
                 self.n_exchange = assign.plan.exchange.len();
                 self.route = assign.route;
                 self.neighbours.clone_from(&assign.plan.neighbours);
@@ -434,11 +431,11 @@ impl Session {
                 actions.push(Action::Send(ToMaster::WorkerState { cycle, last, work }));
                 if stop && self.sample_due {
                     self.phase = Phase::Proving;
-                    let (quantum, time) = self.quantum_and_time()?;
+                    let (quanta, time) = self.quanta_and_time()?;
                     let (dt_previous, gather, blocking) = (self.dt_previous, false, false);
                     actions.push(Action::Compute(Task::Border {
                         dt_previous,
-                        quantum,
+                        quanta,
                         time,
                         gather,
                         blocking,
@@ -456,9 +453,9 @@ impl Session {
                 all_finite("position or velocity", &state)?;
                 self.hand_over(state, actions)?;
                 self.phase = Phase::Elements;
-                let (quantum, time) = self.quantum_and_time()?;
+                let (quanta, time) = self.quanta_and_time()?;
                 let dt_previous = self.dt_previous;
-                actions.push(Action::Compute(Task::Elements { dt_previous, quantum, time }));
+                actions.push(Action::Compute(Task::Elements { dt_previous, quanta, time }));
                 Ok(())
             }
             (Phase::Elements, Outcome::Computed) => {
@@ -525,12 +522,10 @@ impl Session {
         self.orders.get(&before).ok_or_else(|| format!("no orders for the start of cycle {}", self.cycle))
     }
 
-    /// The quantum of forces in this cycle, and when it begins.
-    fn quantum_and_time(&mut self) -> Result<(Quantum, f64), String> {
+    /// The quanta of the sums of this cycle, and when it begins.
+    fn quanta_and_time(&self) -> Result<(Quanta, f64), String> {
         let before = self.flags()?;
-        let (quantum, time) = (before.force_quantum, before.time + before.dt);
-        self.quantum = Some(quantum);
-        Ok((quantum, time))
+        Ok((before.quanta, before.time + before.dt))
     }
 
     fn begin_cycle(&mut self, actions: &mut Vec<Action>) -> Result<(), String> {
@@ -562,9 +557,9 @@ impl Session {
             return self.try_boundary(actions);
         }
         self.phase = Phase::Border;
-        let (quantum, time) = self.quantum_and_time()?;
+        let (quanta, time) = self.quanta_and_time()?;
         let dt_previous = self.dt_previous;
-        actions.push(Action::Compute(Task::Border { dt_previous, quantum, time, gather, blocking }));
+        actions.push(Action::Compute(Task::Border { dt_previous, quanta, time, gather, blocking }));
         Ok(())
     }
 

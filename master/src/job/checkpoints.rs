@@ -7,7 +7,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use mechanics::{
-    exact::Quantum,
+    exact::Quanta,
     rigid::{
         State,
         switch::{self, Formed, Surroundings},
@@ -42,8 +42,8 @@ pub(super) struct Continuation {
     pub(super) dt_previous: f64,
     /// `dt` of the cycle to come; none at the start of a run, where the first vote gives it.
     pub(super) dt: Option<f64>,
-    /// Quantum of forces in the cycle to come, and from the one after it on.
-    pub(super) quanta: [Quantum; 2],
+    /// Quanta of the sums of the cycle to come, and from the one after it on.
+    pub(super) quanta: [Quanta; 2],
     /// The whole vote of the cycle before; none at the start of a run.
     pub(super) vote: Option<Vote>,
     /// Poses of the walls of finite mass in the cycle to come.
@@ -65,7 +65,7 @@ impl Checkpoint {
         let continuation = Continuation {
             dt_previous: 0.0,
             dt: None,
-            quanta: [problem.quanta.force; 2],
+            quanta: [problem.quanta; 2],
             vote: None,
             walls: mechanics::wall::first_poses(&model.setup.walls),
             formed: Vec::new(),
@@ -135,7 +135,7 @@ impl Checkpoint {
         let continuation = Continuation {
             dt_previous: snapshot.dt_previous,
             dt: Some(snapshot.dt),
-            quanta: snapshot.force_quanta,
+            quanta: snapshot.quanta,
             vote: Some(snapshot.vote),
             walls: snapshot.walls,
             formed: snapshot.formed,
@@ -159,7 +159,7 @@ impl Checkpoint {
             state: Arc::clone(state),
             dt_previous: continuation.dt_previous,
             dt: continuation.dt?,
-            force_quanta: continuation.quanta,
+            quanta: continuation.quanta,
             spread_rate: continuation.spread_rate,
             vote: continuation.vote.clone()?,
             walls: continuation.walls.clone(),

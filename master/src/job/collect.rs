@@ -104,7 +104,7 @@ impl Job {
         let Checkpoint { state, continuation } = checkpoint;
         let moment = Moment {
             dt_previous: continuation.dt_previous,
-            quantum: continuation.quanta[0],
+            quanta: continuation.quanta[0],
             time: state.time,
         };
         let wrong = self.epoch.samples.differing(&self.problem, state, moment)?;
@@ -126,7 +126,7 @@ impl Job {
             Some(before) => (before.dt, before.time + before.dt),
             None => (self.checkpoints.newest().continuation.dt_previous, now.time),
         };
-        let moment = Moment { dt_previous, quantum: now.quantum, time };
+        let moment = Moment { dt_previous, quanta: now.quanta, time };
         let wrong = self.epoch.samples.differing(&self.problem, &stopped.state, moment)?;
         if !wrong.is_empty() {
             return self.expel(wrong, actions);
@@ -151,7 +151,7 @@ impl Job {
         Ok(Continuation {
             dt_previous: before.map_or(0.0, |step| step.dt),
             dt: Some(step.dt),
-            quanta: [step.quantum, schedule.quantum()],
+            quanta: [step.quanta, schedule.quanta()],
             vote: Some(vote),
             walls: self.account.walls.clone(),
             formed: self.checkpoints.newest().continuation.formed.clone(),

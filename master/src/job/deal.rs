@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use deck::model::Model;
 use mechanics::{
-    contact::Census, cycle::Plan, cycle::Subdomain, exact::Quanta, piece, rigid::switch, state::GlobalState,
-    vote::Watched,
+    contact::Census, cycle::Plan, cycle::Subdomain, piece, rigid::switch, state::GlobalState, vote::Watched,
 };
 use protocol::message::{Assign, ToWorker};
 use rayon::prelude::*;
@@ -268,7 +267,7 @@ impl Job {
                 epoch,
                 setup: setup.clone(),
                 n_parts: model.mesh.parts.len() as u32,
-                quanta: Quanta { force: checkpoint.continuation.quanta[0], ..problem.quanta },
+                quanta: checkpoint.continuation.quanta[0],
                 subdomains,
                 n_pieces,
                 gauges: output.gauges.iter().map(|g| g.node).collect(),

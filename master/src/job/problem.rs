@@ -20,8 +20,10 @@ use crate::erosion;
 pub(super) struct Problem {
     /// With walls bound to their nodes.
     pub(super) model: Arc<Model>,
-    /// Those of the start; the quantum of forces may grow with the epoch.
+    /// Those of the start; they may grow.
     pub(super) quanta: Quanta,
+    /// Of all nodes.
+    pub(super) mass: f64,
     /// None without contact.
     pub(super) touching: Option<Touching>,
     /// BLAKE3 of all that decides a result but the end of the run, and of the release.
@@ -51,7 +53,8 @@ impl Problem {
         // Much of either is one thread's work.
         let (begun, sum) = rayon::join(|| begin(&model, &constraint), || sum_of(&model));
         let ((start, quanta, touching), sum) = (begun?, sum?);
-        Ok((Self { model, quanta, touching, sum }, start))
+        let mass = start.mass.iter().sum();
+        Ok((Self { model, quanta, mass, touching, sum }, start))
     }
 }
 

@@ -12,7 +12,7 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
-    exact::{Quanta, Quantum},
+    exact::Quanta,
     lanes::Width,
     piece::{self, Piece, Region},
     sample::Sample,
@@ -31,7 +31,7 @@ use super::{
 pub(super) struct Moment {
     /// `dt` of the cycle before (time).
     pub(super) dt_previous: f64,
-    pub(super) quantum: Quantum,
+    pub(super) quanta: Quanta,
     /// What the workers' clock says at the start of the cycle, to the bit (time).
     pub(super) time: f64,
 }
@@ -155,8 +155,7 @@ impl Samples {
 
 /// A block at the start of a cycle, with all that its elements depend on.
 fn sample(problem: &Problem, piece: Piece, cycle: u64, moment: Moment) -> Sample {
-    let Moment { dt_previous, quantum, time } = moment;
-    let quanta = Quanta { force: quantum, ..problem.quanta };
+    let Moment { dt_previous, quanta, time } = moment;
     let (setup, n_parts) = (problem.model.setup.clone(), problem.model.mesh.parts.len());
     Sample { setup, n_parts, quanta, piece, cycle, time, dt_previous }
 }
@@ -175,7 +174,7 @@ mod tests {
     fn the_worker_whose_sample_is_another_than_here_is_named_and_if_all_are_the_master_suspects_itself() {
         let (job, _) = job(2);
         let state = job.start_state();
-        let moment = Moment { dt_previous: 0.0, quantum: job.problem.quanta.force, time: 0.0 };
+        let moment = Moment { dt_previous: 0.0, quanta: job.problem.quanta, time: 0.0 };
         let of_part = |part| {
             let region = Region::Cells { low: [0; 3], high: [2; 3] };
             let piece = piece::cut(&job.problem.model.mesh, state, part, &region);

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use mechanics::{
-    exact::Quantum,
+    exact::{ENERGY_BITS, FORCE_BITS, MOMENTUM_BITS, Quanta, Quantum},
     rigid::State,
     setup::{Control, Setup},
     vote::Vote,
@@ -42,8 +42,8 @@ pub(super) struct Step {
     pub(super) dt: f64,
     /// Time at its start.
     pub(super) time: f64,
-    /// Quantum of its forces.
-    pub(super) quantum: Quantum,
+    /// Quanta of its sums.
+    pub(super) quanta: Quanta,
 }
 
 /// The step after one that is over.
@@ -74,8 +74,8 @@ pub(super) struct Schedule {
     completed: u64,
     /// By cycle; a few cycles around the present.
     steps: BTreeMap<u64, Step>,
-    /// Quantum of forces from the cycle after the last ordered one on.
-    quantum: Quantum,
+    /// Quanta of the sums from the cycle after the last ordered one on.
+    quanta: Quanta,
     /// Between two states for the user (time); none without.
     period: Option<f64>,
     /// When the next one is due (time).
@@ -93,15 +93,15 @@ impl Schedule {
             let [now, _] = continuation.quanta;
             if let Some(before) = first.checked_sub(1) {
                 let dt = continuation.dt_previous;
-                steps.insert(before, Step { dt, time: time - dt, quantum: now });
+                steps.insert(before, Step { dt, time: time - dt, quanta: now });
             }
-            steps.insert(first, Step { dt, time, quantum: now });
+            steps.insert(first, Step { dt, time, quanta: now });
         }
         Self {
             first_cycle: first,
             completed: first,
             steps,
-            quantum: continuation.quanta[1],
+            quanta: continuation.quanta[1],
             period,
             next_state: period.map(|period| output_after(time, period)),
             stop: None,
@@ -136,9 +136,9 @@ impl Schedule {
         self.step(cycle).ok_or(Error::NotOrdered(cycle))
     }
 
-    /// Quantum of forces from the cycle after the last ordered one on.
-    pub(super) fn quantum(&self) -> Quantum {
-        self.quantum
+    /// Quanta of the sums from the cycle after the last ordered one on.
+    pub(super) fn quanta(&self) -> Quanta {
+        self.quanta
     }
 
     /// The step of the first cycle: the checkpoint's; at the start of a run a part of `allowed`, up to the end of the run.
@@ -152,7 +152,7 @@ impl Schedule {
             return Ok(step);
         }
         let dt = allowed()?.min(control.end_time - time).max(0.0);
-        let step = Step { dt, time, quantum: self.quantum };
+        let step = Step { dt, time, quanta: self.quanta };
         self.steps.insert(self.first_cycle, step);
         Ok(step)
     }
@@ -169,24 +169,35 @@ impl Schedule {
         let remaining = (control.end_time - time).max(0.0);
         let (dt, limit) = if remaining < dt * 1.000_000_1 { (remaining, Limit::End) } else { (dt, limit) };
         let time_after = if limit == Limit::End { control.end_time } else { time + dt };
-        self.steps.insert(cycle + 1, Step { dt, time, quantum: self.quantum });
+        self.steps.insert(cycle + 1, Step { dt, time, quanta: self.quanta });
         while self.steps.len() > REMEMBERED {
             self.steps.pop_first();
         }
         Next { dt, limit, time, time_after }
     }
 
-    /// Forces nearing the bound of exact sums ask for a coarser quantum.
+    /// Forces, energies and momenta nearing the bound of exact sums ask for coarser quanta, of a run whose nodes have this `mass` together.
     ///
     /// # Errors
-    /// If they are past it.
-    pub(super) fn rescale(&mut self, vote: &Vote) -> Result<(), Error> {
-        let quantum = self.quantum;
+    /// If forces are past it.
+    pub(super) fn rescale(&mut self, vote: &Vote, mass: f64) -> Result<(), Error> {
+        let quantum = self.quanta.force;
         if vote.force_bound > quantum.term_bound() || !vote.force_bound.is_finite() {
             return Err(Error::Force { bound: vote.force_bound, quantum });
         }
         if vote.force_bound > quantum.rescale_bound() {
-            self.quantum = Quantum::for_reference(vote.force_bound, 42);
+            self.quanta.force = Quantum::for_reference(vote.force_bound, FORCE_BITS);
+        }
+        let energy = vote.energies();
+        // By Cauchy and Schwarz no sum of `m |v|` is more.
+        let momentum = (2.0 * mass * energy).sqrt();
+        for (quantum, sum, bits) in [
+            (&mut self.quanta.energy, energy, ENERGY_BITS),
+            (&mut self.quanta.momentum, momentum, MOMENTUM_BITS),
+        ] {
+            if sum > quantum.sum_bound() && sum.is_finite() {
+                *quantum = Quantum::for_reference(sum, bits);
+            }
         }
         Ok(())
     }
@@ -425,13 +436,36 @@ mod tests {
     #[test]
     fn forces_near_the_bound_of_exact_sums_coarsen_the_quantum_and_those_past_it_end_the_run() {
         let mut schedule = schedule(None);
-        let before = schedule.quantum();
+        let before = schedule.quanta().force;
         let vote = |force_bound| Vote { force_bound, ..Vote::empty(1) };
-        schedule.rescale(&vote(before.rescale_bound())).expect("not above");
-        assert_eq!(schedule.quantum(), before);
-        schedule.rescale(&vote(1.01 * before.rescale_bound())).expect("below the bound");
-        assert!(schedule.quantum().value() > before.value());
-        let past = vote(2.0 * schedule.quantum().term_bound());
-        assert!(matches!(schedule.rescale(&past), Err(Error::Force { .. })));
+        schedule.rescale(&vote(before.rescale_bound()), 1.0).expect("not above");
+        assert_eq!(schedule.quanta().force, before);
+        schedule.rescale(&vote(1.01 * before.rescale_bound()), 1.0).expect("below the bound");
+        assert!(schedule.quanta().force.value() > before.value());
+        let past = vote(2.0 * schedule.quanta().force.term_bound());
+        assert!(matches!(schedule.rescale(&past, 1.0), Err(Error::Force { .. })));
+    }
+
+    #[test]
+    fn energies_and_momenta_near_the_bound_of_exact_sums_coarsen_their_quanta() {
+        let mut schedule = schedule(None);
+        let before = schedule.quanta();
+        let vote = |kinetic: f64| {
+            let mut vote = Vote::empty(2);
+            (vote.parts[0].kinetic, vote.parts[1].kinetic) = (0.5 * kinetic, 0.5 * kinetic);
+            vote
+        };
+        // Of so little mass that momenta stay far below.
+        let most = before.energy.sum_bound();
+        schedule.rescale(&vote(most), f64::MIN_POSITIVE).expect("not above");
+        assert_eq!(schedule.quanta(), before);
+        schedule.rescale(&vote(1.01 * most), f64::MIN_POSITIVE).expect("below the bound");
+        let coarser = Quantum::for_reference(1.01 * most, ENERGY_BITS);
+        assert_eq!(schedule.quanta(), Quanta { energy: coarser, ..before });
+        // `m |v|` is at most the root of twice mass and energy.
+        let (energy, most) = (0.5 * most, before.momentum.sum_bound());
+        let mass = 1.01 * most * most / (2.0 * energy);
+        schedule.rescale(&vote(energy), mass).expect("below the bound");
+        assert!(schedule.quanta().momentum.value() > before.momentum.value());
     }
 }

@@ -508,7 +508,7 @@ mod tests {
         let others = [
             sum_with(&|parts| parts.state.v[3][1] = f64::MIN_POSITIVE),
             sum_with(&|parts| parts.rest.dt = Some(1.0)),
-            sum_with(&|parts| parts.rest.quanta[1] = Quantum::for_reference(1e9, 42)),
+            sum_with(&|parts| parts.rest.quanta[1].energy = Quantum::for_reference(1e9, 42)),
             sum_with(&|parts| parts.rest.run_totals.friction = f64::MIN_POSITIVE),
             sum_with(&|parts| parts.rest.run_totals.worst_penetration = 0.5),
             sum_with(&|parts| parts.rest.walls.push(Pose::default())),

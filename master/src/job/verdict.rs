@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use mechanics::{
     contact::{edges::EDGE, reach},
+    exact::Quantum,
     vote::Vote,
     wall::{self, Pose},
 };
@@ -71,7 +72,7 @@ impl Account {
         vote: &Vote,
         actions: &mut Vec<Action>,
     ) {
-        let Step { dt, time, .. } = step;
+        let Step { dt, time, quanta } = step;
         let gap = problem.model.setup.contact.as_ref().map(|c| c.gap);
         self.run_totals.book(vote, cycle, time, dt, gap);
         self.run_totals.book_eroded(vote, &problem.model);
@@ -99,8 +100,8 @@ impl Account {
             ))
         } else {
             stale(problem, vote, cycle)
-                .or_else(|| self.run_away(problem, cycle))
-                .or_else(|| self.body_runs_away(problem, cycle))
+                .or_else(|| self.run_away(problem, (cycle, quanta.energy)))
+                .or_else(|| self.body_runs_away(problem, (cycle, quanta.energy)))
                 .or_else(|| came_apart(problem, vote, cycle))
         };
         if self.failure.is_some() && !written {
@@ -109,11 +110,10 @@ impl Account {
     }
 
     /// Whether more energy appeared or vanished than the deck allows.
-    fn run_away(&self, problem: &Problem, cycle: u64) -> Option<String> {
+    fn run_away(&self, problem: &Problem, (cycle, quantum): (u64, Quantum)) -> Option<String> {
         let (error, limit) = (self.run_totals.last.error, problem.model.setup.control.energy_error);
         // Energies are sums of whole quanta, one rounding for each element and cycle: what lies below cannot be judged.
-        let rounding =
-            0.5 * problem.quanta.energy.value() * problem.model.mesh.n_elements() as f64 * (cycle + 1) as f64;
+        let rounding = 0.5 * quantum.value() * problem.model.mesh.n_elements() as f64 * (cycle + 1) as f64;
         let settled = self.run_totals.first_stirred.is_some_and(|first| cycle >= first + SETTLED);
         if !settled || error.abs() <= limit || self.run_totals.unexplained().abs() <= rounding {
             return None;
@@ -136,10 +136,10 @@ impl Account {
 
     /// Whether a body, of parts that nothing else has touched, gained more energy than the deck allows: in the totals of a large run it
     /// would not show.
-    fn body_runs_away(&self, problem: &Problem, cycle: u64) -> Option<String> {
+    fn body_runs_away(&self, problem: &Problem, (cycle, quantum): (u64, Quantum)) -> Option<String> {
         let limit = problem.model.setup.control.energy_error;
         let parts = &problem.model.mesh.parts;
-        let rounding = 0.5 * problem.quanta.energy.value() * (cycle + 1) as f64;
+        let rounding = 0.5 * quantum.value() * (cycle + 1) as f64;
         let bodies = self.run_totals.bodies();
         if bodies.len() < 2 {
             return None;
@@ -298,13 +298,14 @@ mod tests {
         };
         (0..30).for_each(|cycle| book(cycle, 1e6));
         book(30, 1e7);
-        assert_eq!(account.run_away(problem, 30), None, "the sum hides it");
+        assert_eq!(account.run_away(problem, (30, problem.quanta.energy)), None, "the sum hides it");
         let bodies = account.run_totals.bodies();
         assert_eq!(
             bodies.iter().map(|body| (&body.parts[..], body.gain)).collect::<Vec<_>>(),
             [(&[0][..], 0.0), (&[1][..], 9e6)]
         );
-        let told = account.body_runs_away(problem, 30).expect("nine tenths of its energy");
+        let told =
+            account.body_runs_away(problem, (30, problem.quanta.energy)).expect("nine tenths of its energy");
         let name = &problem.model.mesh.parts[1].name;
         assert!(
             told.starts_with(&format!(
@@ -316,6 +317,6 @@ mod tests {
         let touched = PairSums { parts: [0, 1], ..PairSums::default() };
         account.run_totals.contacts.push(touched);
         assert_eq!(account.run_totals.bodies().len(), 1);
-        assert_eq!(account.body_runs_away(problem, 30), None);
+        assert_eq!(account.body_runs_away(problem, (30, problem.quanta.energy)), None);
     }
 }

@@ -274,7 +274,11 @@ pub fn write_durably(path: &Path, bytes: &[u8]) -> io::Result<()> {
 mod tests {
     use std::sync::Arc;
 
-    use mechanics::{exact::Quantum, state::GlobalState, vote::Vote};
+    use mechanics::{
+        exact::{Quanta, Quantum},
+        state::GlobalState,
+        vote::Vote,
+    };
 
     use super::*;
     use crate::run_totals::RunTotals;
@@ -286,12 +290,13 @@ mod tests {
         // More than two chunks.
         let x = (0..100_000).map(|n| [n as f64, 0.5, cycle as f64]).collect();
         let state = GlobalState { cycle, x, ..GlobalState::default() };
+        let quantum = Quantum::for_reference(1.0, 42);
         Snapshot {
             problem: [7; 32],
             state: Arc::new(state),
             dt_previous: 0.1,
             dt: 0.2,
-            force_quanta: [Quantum::for_reference(1.0, 42); 2],
+            quanta: [Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 }; 2],
             spread_rate: 0.0,
             vote: Vote::empty(1),
             walls: Vec::new(),

@@ -39,7 +39,7 @@ fn greeting_has_its_golden_bytes() {
     let (_, frame) = Client::new(&hello()).expect("a good greeting");
     #[rustfmt::skip]
     let golden = [
-        21, 0,                                           // version
+        22, 0,                                           // version
         0, 0, 0, 0,                                      // worker
         4, 0, 0, 0, 0, 0, 0, 0, b'p', b'c', b'-', b'1',  // name
         0, 0, 0, 0, 0, 0, 0xf8, 0x3f,                    // speed 1.5

@@ -21,7 +21,7 @@ use mechanics::{
         hourglass::{Hourglass, N_FORCES},
         shell4::{Rule, ShellStep, Shells},
     },
-    exact::Quantum,
+    exact::{Quanta, Quantum},
     initial,
     lanes::Width,
     material::{Eos, Failure, Heat, Material, Strength},
@@ -207,7 +207,7 @@ fn plates(
     kind: Kind,
     width: Width,
     n_pieces: usize,
-) -> (Domain, Quantum, usize) {
+) -> (Domain, Quanta, usize) {
     let row = side + 1;
     let plane = row * row;
     let n_nodes = plane * (below + above + 1);
@@ -331,7 +331,7 @@ fn plates(
     let mut domain = Domain::new(setup, n_parts, quanta, (subdomains, 0), &[], width);
     let plan = Plan { moments: kind == Kind::Shells, ..Plan::default() };
     domain.install(&plan, &[], &Silent).expect("a plan without other workers");
-    (domain, quanta.force, n_elements)
+    (domain, quanta, n_elements)
 }
 
 /// Books nothing: the bench reads the clock itself.
@@ -363,7 +363,7 @@ impl Meter for Dealt {
 
 /// Median and least over `n_cycles` cycles of the nanoseconds per element of a whole cycle by `clock` (seconds), from the
 /// impact on.
-fn whole_cycle(domain: (Domain, Quantum, usize), n_cycles: usize, clock: &dyn Fn() -> f64) -> [f64; 2] {
+fn whole_cycle(domain: (Domain, Quanta, usize), n_cycles: usize, clock: &dyn Fn() -> f64) -> [f64; 2] {
     let n_elements = domain.2 as f64;
     let mut times = cycle_times(domain, n_cycles, clock, &Silent);
     times.sort_by(f64::total_cmp);
@@ -372,7 +372,7 @@ fn whole_cycle(domain: (Domain, Quantum, usize), n_cycles: usize, clock: &dyn Fn
 
 /// Times of whole cycles by `clock` (seconds), from the impact on; `meter` hears of them.
 fn cycle_times(
-    (mut domain, quantum, _): (Domain, Quantum, usize),
+    (mut domain, quanta, _): (Domain, Quanta, usize),
     n_cycles: usize,
     clock: &dyn Fn() -> f64,
     meter: &dyn Meter,
@@ -383,7 +383,7 @@ fn cycle_times(
         .map(|cycle| {
             let limit = 0.6666 * vote.courant.min(vote.volume_limit);
             let dt = if cycle == 0 { 0.5 * limit } else { limit.min(1.05 * dt_previous) };
-            let now = Interval { time: 0.0, dt_previous, dt, quantum };
+            let now = Interval { time: 0.0, dt_previous, dt, quanta };
             let start = clock();
             vote = cycle::step(&mut domain, &now, &[], |_, partials| partials, meter)
                 .expect("totals of the exchange");

@@ -29,7 +29,7 @@ use crate::{
     copy_index::CopyIndex,
     cross_section,
     element::{ElementVote, Step},
-    exact::{Quanta, Quantum},
+    exact::Quanta,
     joint::{JointVote, Mechanism},
     lanes::Width,
     load::face,
@@ -49,7 +49,7 @@ use sharing::{Exchange, Groups, Holders, Numbers};
 pub use standing::{Added, Standing};
 use touch::HeldContact;
 
-/// The time of a cycle, its steps, and the quantum of its forces.
+/// The time of a cycle, its steps, and the quanta of its sums.
 #[derive(Clone, Copy, Debug)]
 pub struct Interval {
     /// `t_n` (time).
@@ -58,8 +58,8 @@ pub struct Interval {
     pub dt_previous: f64,
     /// `dt_n`, which leads to `x_{n+1}` (time).
     pub dt: f64,
-    /// Quantum of forces, which an order may have made coarser.
-    pub quantum: Quantum,
+    /// Quanta of the sums, which an order may have made coarser.
+    pub quanta: Quanta,
 }
 
 /// One cycle from `x_n` to `x_{n+1}`: the documented steps, one line each. A worker's session does them task by task, because
@@ -76,7 +76,7 @@ pub fn step(
     exchange: impl FnOnce(&Domain, Vec<f64>) -> Vec<f64>,
     meter: &dyn Meter,
 ) -> Result<Vote, String> {
-    domain.begin(now.quantum, now.time);
+    domain.begin(now.quanta, now.time);
     domain.contact(now.dt_previous, meter);
     domain.elements(Sets::Border, now.dt_previous, meter);
     let partials = domain.partials(meter);
@@ -161,9 +161,9 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// A cycle begins at `time` with this quantum of forces, which an order may have made coarser.
-    pub fn begin(&mut self, quantum: Quantum, time: f64) {
-        self.quanta.force = quantum;
+    /// A cycle begins at `time` with these quanta of its sums, which an order may have made coarser.
+    pub fn begin(&mut self, quanta: Quanta, time: f64) {
+        self.quanta = quanta;
         self.time = time;
     }
 

@@ -9,6 +9,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::lanes::{Lane, scalar::Scalar};
 
+/// Bits of the reference of forces in quanta: a term may then reach 32 references (`2^47 q`) and 64 terms add without overflow.
+pub const FORCE_BITS: i32 = 42;
+/// The same of energies, of which sums over all nodes and elements may reach 16 references before their quantum grows.
+pub const ENERGY_BITS: i32 = 46;
+/// The same of momenta.
+pub const MOMENTUM_BITS: i32 = 50;
+
 /// A power of two to whose multiples terms of one kind are rounded before they are added.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quantum {
@@ -17,8 +24,6 @@ pub struct Quantum {
 
 impl Quantum {
     /// The quantum at which a reference magnitude is `2^bits` quanta.
-    ///
-    /// Forces use 42 bits: a term may then reach 32 references (`2^47 q`) and 64 terms add without overflow.
     ///
     /// # Panics
     /// If `reference` is not a positive finite number or the quantum would leave the range of normal numbers.
@@ -72,7 +77,13 @@ impl Quantum {
         self.q * 140_737_488_355_328.0
     }
 
-    /// Magnitude at which a coarser quantum is asked for: `2^44 q`.
+    /// Magnitude of a sum of any number of terms at which a coarser quantum is asked for: `2^50 q`, an eighth of what is exact, for a
+    /// sum goes on growing until the coarser one acts.
+    pub fn sum_bound(self) -> f64 {
+        self.q * 1_125_899_906_842_624.0
+    }
+
+    /// Magnitude of a term of forces at which a coarser quantum is asked for: `2^44 q`.
     pub fn rescale_bound(self) -> f64 {
         self.q * 17_592_186_044_416.0
     }
@@ -114,10 +125,10 @@ impl Dithered {
     }
 }
 
-/// The quanta of a run's sums.
+/// The quanta of a run's sums; all but that of arms grow where sums near what is exact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quanta {
-    /// Forces; may be made coarser by an order.
+    /// Forces.
     pub force: Quantum,
     /// Energies.
     pub energy: Quantum,

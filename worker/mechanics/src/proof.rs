@@ -284,10 +284,10 @@ fn start(material: Material, seed: u64) -> Sample {
 /// Three cycles of a block.
 fn of_elements(material: Material, seed: u64, width: Width, hasher: &mut blake3::Hasher) {
     let sample = start(material, seed);
-    let quantum = sample.quanta.force;
+    let quanta = sample.quanta;
     let mut domain = sample.into_domain(width);
     for n in 0..3 {
-        let now = Interval { time: DT * f64::from(n), dt_previous: DT, dt: DT, quantum };
+        let now = Interval { time: DT * f64::from(n), dt_previous: DT, dt: DT, quanta };
         let hashed = |domain: &Domain, partials| {
             hasher.update(&domain.sample(0).expect("there is one block"));
             partials

@@ -35,9 +35,9 @@ impl Sample {
     /// # Errors
     /// If the piece makes no block.
     pub fn hash(self, width: Width) -> Result<[u8; 16], String> {
-        let (force, time, dt_previous) = (self.quanta.force, self.time, self.dt_previous);
+        let (quanta, time, dt_previous) = (self.quanta, self.time, self.dt_previous);
         let mut domain = self.into_domain(width);
-        domain.begin(force, time);
+        domain.begin(quanta, time);
         domain.contact(dt_previous, &Unmeasured);
         domain.elements(Sets::All, dt_previous, &Unmeasured);
         domain.sample(0)

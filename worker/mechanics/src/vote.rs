@@ -176,6 +176,25 @@ impl Vote {
         }
     }
 
+    /// All its energies added up: no sum of energies of the cycle is more, as far as parts of a sum do not cancel (energy).
+    pub fn energies(&self) -> f64 {
+        let of_work = |work: &Work| work.before.abs() + work.after.abs();
+        let of_part = |part: &PartVote| {
+            let PartVote { kinetic, internal, hourglass, viscosity, gone, momentum: _, external } = part;
+            kinetic.abs()
+                + internal.abs()
+                + hourglass.abs()
+                + viscosity.abs()
+                + gone.abs()
+                + of_work(external)
+        };
+        let of_wall = |wall: &WallVote| of_work(&wall.work) + of_work(&wall.loss);
+        self.parts.iter().map(of_part).sum::<f64>()
+            + self.walls.iter().map(of_wall).sum::<f64>()
+            + self.contact.abs()
+            + self.friction.abs()
+    }
+
     /// Joins the vote of other elements and nodes of the same cycle; the order of merging is no matter.
     pub fn merge(&mut self, other: &Self) {
         if (other.courant, other.courant_element) < (self.courant, self.courant_element) {

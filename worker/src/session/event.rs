@@ -1,6 +1,6 @@
 //! What happens to a session, and what it wants done.
 
-use mechanics::{contact::PlacedPatch, cycle::Plan, exact::Quantum, piece::Piece, vote::Vote, wall::Pose};
+use mechanics::{contact::PlacedPatch, cycle::Plan, exact::Quanta, piece::Piece, vote::Vote, wall::Pose};
 use protocol::message::{Around, Assign, SortedPatch, ToMaster, ToPeer, ToWorker, Work};
 
 /// What happens to a session.
@@ -45,8 +45,8 @@ pub enum Task {
     Elements {
         /// The step before.
         dt_previous: f64,
-        /// Quantum of forces from now on.
-        quantum: Quantum,
+        /// Quanta of the sums from now on.
+        quanta: Quanta,
         /// When the cycle begins.
         time: f64,
     },
@@ -68,8 +68,8 @@ pub enum Task {
     Border {
         /// The step before.
         dt_previous: f64,
-        /// Quantum of forces from now on.
-        quantum: Quantum,
+        /// Quanta of the sums from now on.
+        quanta: Quanta,
         /// When the cycle begins.
         time: f64,
         /// Gather positions first.

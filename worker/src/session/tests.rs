@@ -3,7 +3,7 @@
 use super::*;
 use mechanics::{
     cycle::{Ghost, Plan, Subdomain},
-    exact::Quanta,
+    exact::{Quanta, Quantum},
     setup::{Control, Setup},
 };
 use protocol::message::{Aboard, BranchVote, Said, ToPeer, Tree, Work};
@@ -56,14 +56,15 @@ pub(super) fn assign(cycle: u64) -> Box<Assign> {
 }
 
 pub(super) fn orders(next: u64) -> Orders {
-    let force_quantum = Quantum::for_reference(1.0, 42);
+    let quantum = Quantum::for_reference(1.0, 42);
+    let quanta = Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 };
     let (dt, time, walls) = (1e-3, 1e-3 * next as f64, Vec::new());
     Orders {
         next,
         dt,
         time,
         walls,
-        force_quantum,
+        quanta,
         gather: false,
         blocking: false,
         collect: false,

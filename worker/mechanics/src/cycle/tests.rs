@@ -133,7 +133,7 @@ fn run(friction: f64, width: Width) -> (Vec<u64>, u64) {
     let mut domain = touching(friction, width);
     let (mut bits, mut hits, mut dt_previous) = (Vec::new(), 0, 0.0);
     for cycle in 0..20 {
-        domain.begin(domain.quanta.force, DT * f64::from(cycle));
+        domain.begin(domain.quanta, DT * f64::from(cycle));
         domain.contact(dt_previous, &Silent);
         let held = domain.contact.first().expect("the plan has a batch");
         assert_eq!(held.contact.width(), width, "contact on other lanes than those of the elements");
@@ -208,7 +208,7 @@ fn element_gauges_on_shells_read_what_the_state_has_of_them() {
     const DT: f64 = 0.02;
     let mut domain = folding_plate();
     for cycle in 0..30 {
-        domain.begin(domain.quanta.force, DT * f64::from(cycle));
+        domain.begin(domain.quanta, DT * f64::from(cycle));
         domain.elements(Sets::All, DT, &Silent);
         let vote = domain.integrate(&[], DT, DT, &[], &Silent).expect("no node is exchanged");
         let piece = domain.pieces().remove(0);
