@@ -61,6 +61,18 @@ fn a_prescribed_velocity_does_its_work_when_it_begins() {
     }
     let last = &solved.outcome.run_totals.last;
     assert!((last.kinetic / (0.5 * MASS * 25.0) - 1.0).abs() < 1e-9, "{last:?}");
+    // Spans of a part of a step, at the start, within a step and over two: whoever is free afterwards goes on as fast.
+    for from in [0.0, 4.3e-6, 0.49 * slack, 7.9 * slack] {
+        let until = from + 0.2 * slack;
+        let solved = run(cube(
+            1e-5,
+            &format!(
+                "[[boundary]]\ntype = \"velocity\"\nvelocity = {{ x = 5 }}\nfrom = {from}\nuntil = {until}\n"
+            ),
+        ));
+        let last = &solved.outcome.run_totals.last;
+        assert!((last.momentum[0] / (5.0 * MASS) - 1.0).abs() < 1e-9, "{from}: {last:?}");
+    }
     assert!((last.external / last.kinetic - 1.0).abs() < 1e-9 && last.error.abs() < 1e-9, "{last:?}");
 }
 

@@ -33,8 +33,8 @@ pub(super) struct Foresight {
 /// The step whose speeds are wanted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
-    /// Middle of the step of the newest vote (time); none before the first step.
-    pub(super) known: Option<f64>,
+    /// The step of the newest vote, its start and its length (time); none before the first step.
+    pub(super) known: Option<[f64; 2]>,
     /// Start of the step (time).
     pub(super) from: f64,
     /// The longest that the step can be (time).
@@ -113,7 +113,7 @@ impl Mover {
         let of = |drive: &Drive| {
             let [low, high] = drive.range(curves, window.from, until).unwrap_or_default();
             let known = window.known.filter(|_| !self.begins_later);
-            let known = known.and_then(|time| drive.prescribed(curves, time));
+            let known = known.and_then(|[start, dt]| drive.prescribed_for(curves, start, dt));
             let change = known.map_or(f64::INFINITY, |known| (high - known).abs().max((low - known).abs()));
             (low.abs().max(high.abs()), change)
         };
@@ -159,9 +159,10 @@ mod tests {
         // Rests until 1, then moves at 5 for a while.
         let curves = [Curve { points: vec![[1.0, 0.0], [1.000_001, 5.0], [2.0, 5.0], [2.000_001, 0.0]] }];
         let foresight = along(Drive::along(0, 1.0));
+        // The step of the vote is a short one around a time.
         let speed = |known: f64, from: f64, ahead: f64| {
             foresight
-                .speed(&curves, Window { known: Some(known), from, longest: 0.1 }, ahead)
+                .speed(&curves, Window { known: Some([known - 0.01, 0.02]), from, longest: 0.1 }, ahead)
                 .expect("a motion")
         };
         assert_eq!(speed(0.7, 0.8, 0.3), 0.3, "nothing changes by 0.9");
@@ -178,7 +179,8 @@ mod tests {
     #[test]
     fn a_motion_that_begins_in_a_span_is_foreseen_though_nobody_knows_how_fast_its_node_is_before() {
         let drive = Drive { span: Span { from: 1.0, until: 2.0 }, ..Drive::constant(3.0) };
-        let speed = |known, from| {
+        let speed = |known: Option<f64>, from| {
+            let known = known.map(|known| [known - 0.01, 0.02]);
             along(drive).speed(&[], Window { known, from, longest: 0.1 }, 4.0).expect("a motion")
         };
         assert_eq!(speed(Some(0.8), 0.85), 4.0, "not yet");
@@ -193,7 +195,7 @@ mod tests {
         let curves = [Curve { points: vec![[0.0, 0.0], [1.0, 2.0]] }];
         let turn = Mover::of(&[None; 3], [(Drive::along(0, 1.0), 3.0)].into_iter());
         let foresight = Foresight { movers: vec![turn] };
-        let window = Window { known: Some(0.5), from: 0.5, longest: 0.25 };
+        let window = Window { known: Some([0.375, 0.25]), from: 0.5, longest: 0.25 };
         assert_eq!(foresight.speed(&curves, window, 3.0), Some(4.5), "1.5 more than 3");
         assert_eq!(foresight.speed(&curves, window, 0.0), Some(1.5), "a vote may know less than the curve");
     }

@@ -273,7 +273,7 @@ pub(super) fn step_after(
 ) -> (f64, Limit, Option<u32>) {
     let grown = problem.model.setup.control.growth * before.dt;
     let window = Window {
-        known: known.map(|dt| 0.5f64.mul_add(-dt, before.time)),
+        known: known.map(|dt| [before.time - dt, dt]),
         from: before.time + before.dt,
         longest: grown,
     };

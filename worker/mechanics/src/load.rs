@@ -175,21 +175,20 @@ impl Drive {
         self.acts(time).then(|| self.at(curves, time))
     }
 
-    /// The value for a step `dt` from a time on: where it acts in the middle, its mean over what the step has of its span. A span within the step
-    /// gives the whole step its way.
+    /// The value for a step `dt` from a time on: where it acts in the middle, its mean over what the step has of its span. A span that is
+    /// shorter than the step acts in the step that has its middle: whoever is free afterwards goes on as fast.
     ///
     /// # Panics
     /// If there is no such curve.
     pub fn prescribed_for(&self, curves: &[Curve], time: f64, dt: f64) -> Option<f64> {
         let Span { from, until } = self.span;
         let end = time + dt;
-        if time < from && from < until && until < end {
-            return Some(self.mean(curves, time, end));
-        }
-        let acts = self.acts(0.5f64.mul_add(dt, time));
-        acts.then(|| {
-            self.factor * self.curve.map_or(1.0, |c| curves[c as usize].mean(time.max(from), end.min(until)))
-        })
+        let (acts, begins, ends) = if from < until && until - from < dt {
+            ((time..end).contains(&(0.5 * (from + until))), from, until)
+        } else {
+            (self.acts(0.5f64.mul_add(dt, time)), time.max(from), end.min(until))
+        };
+        acts.then(|| self.factor * self.curve.map_or(1.0, |c| curves[c as usize].mean(begins, ends)))
     }
 
     /// The least and the greatest value from a time on until another, of the times at which it acts; none if it acts at none.
@@ -389,9 +388,12 @@ mod tests {
         let spanned = Drive { span: Span { from: 1.0, until: 2.0 }, ..whole };
         assert_eq!(
             [(0.0, 1.5), (0.0, 2.0), (1.5, 2.0)].map(|(t, dt)| spanned.prescribed_for(&curves, t, dt)),
-            [None, Some(2.0), None]
+            [None, Some(2.0), Some(2.0)],
+            "a short span acts in the step of its middle"
         );
-        assert_eq!(spanned.prescribed_for(&curves, 0.5, 2.0), Some(1.0), "within the step");
+        assert_eq!(spanned.prescribed_for(&curves, 0.5, 2.0), Some(2.0), "within the step");
+        let thirds = [0.0, 0.4, 0.8, 1.2, 1.6, 2.0].map(|t| spanned.prescribed_for(&curves, t, 0.4));
+        assert_eq!(thirds.map(|value| value.is_some()), [false, false, true, true, false, false]);
     }
 
     #[test]
