@@ -32,6 +32,8 @@ const ROOM_TO_GROW: f64 = 1.01;
 /// Share of the allowed time step that a run begins with where bodies hold energy. Where a gas meets a thinner one, the
 /// first steps raise velocities from nothing, and viscosity with them, before a vote can tell.
 const START: f64 = 0.2;
+/// Whole numbers below it have a next one (`2^53`).
+const WHOLE: f64 = 9_007_199_254_740_992.0;
 /// Cycles whose steps are remembered.
 const REMEMBERED: usize = 4;
 
@@ -246,9 +248,12 @@ impl Schedule {
 }
 
 /// The first multiple of `period` after `time`, to the bit: at whatever time it is asked between two of them, it is the
-/// same one.
+/// same one. Of a period below the last digit of `time` it is the next number after it: each cycle has a state.
 pub(super) fn output_after(time: f64, period: f64) -> f64 {
     let mut count = (time / period).floor();
+    if count >= WHOLE {
+        return time.next_up();
+    }
     while count * period > time {
         count -= 1.0;
     }
@@ -393,6 +398,9 @@ mod tests {
             assert_eq!(output_after(time, 0.1).to_bits(), 0.1_f64.to_bits(), "{time}");
         }
         assert_eq!(output_after(0.1, 0.1).to_bits(), 0.2_f64.to_bits(), "after, not at");
+        for period in [1e-20, 1e-30, f64::MIN_POSITIVE] {
+            assert_eq!(output_after(0.1, period), 0.1_f64.next_up(), "{period}");
+        }
     }
 
     #[test]
