@@ -325,7 +325,8 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
     let mut resisted = hourglass;
     if elastic_control {
         let spin = spin_of(&gradient, L::splat(0.5 * step.dt));
-        let turned = view.hourglass::<L>(slot).turned(&rotation(&spin));
+        let before = view.hourglass::<L>(slot);
+        let turned = before.turned(&rotation(&spin));
         let frame = Frame {
             axes: [&mid.a, &mid.b, &mid.c],
             volume: at_mid.volume(),
@@ -345,7 +346,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
             let share = L::select(yields, most / bent.sqrt(), one);
             elastic = elastic.scaled(share);
         }
-        let power = elastic.mul_add(one, &turned).dot(&hourglass);
+        let power = elastic.mul_add(one, &before).dot(&hourglass);
         let damped = L::splat(step.dt / 8.0) * resist * modes_square;
         taken = L::splat(0.5 * step.dt).mul_add(power, damped);
         check = check + elastic.square();

@@ -143,9 +143,9 @@ impl<L: Lane> Stressed<L> {
             } else {
                 stress = laws.strength.update(trial, strain, &mut history, alive);
             }
-            // The stress before, turned, is `turned` less its half of the increment.
-            let sum = turned.plus(&stress);
-            power = half * half_increment.neg_mul_add(rate_square, sum.contract(&rate));
+            // The mean of both ends is the stress of the middle, as the rate is, whose axes have not turned: to second order the work of the
+            // forces. With the stress before turned to the end a body that spins would seem to gain energy.
+            power = half * before.plus(&stress).contract(&rate);
             if laws.elastic_control() {
                 left = L::select(failed, zero, one);
                 let yields = plastic_before.less(history.plastic_strain);

@@ -148,8 +148,9 @@ pub(super) unsafe fn slots<L: Lane, S: StrengthLaw, F: FailureLaw>(
     let mut forces = [amplitudes[0].scaled(resist), amplitudes[1].scaled(resist)];
     if form.n_modes > 0 && laws.hourglass.elastic {
         let spin = spin_of(&gradient, L::splat(0.5 * step.dt));
-        let turned = view.hourglass::<L>(slot).turned(&rotation(&spin));
-        let turned = of_kept(&turned);
+        let before = view.hourglass::<L>(slot);
+        let turned = of_kept(&before.turned(&rotation(&spin)));
+        let before = of_kept(&before);
         let grown = if laws.hourglass.assumes_strain {
             let rate = form.assumed(&laws.hourglass, &mid, at_mid.volume, &amplitudes);
             [rate[0].scaled(L::splat(step.dt)), rate[1].scaled(L::splat(step.dt))]
@@ -171,7 +172,7 @@ pub(super) unsafe fn slots<L: Lane, S: StrengthLaw, F: FailureLaw>(
             let share = L::select(yields, most / bent.sqrt(), one);
             elastic = [elastic[0].scaled(share), elastic[1].scaled(share)];
         }
-        let both = [elastic[0].mul_add(one, &turned[0]), elastic[1].mul_add(one, &turned[1])];
+        let both = [elastic[0].mul_add(one, &before[0]), elastic[1].mul_add(one, &before[1])];
         taken = L::splat(0.5 * step.dt).mul_add(dot(&both, &amplitudes), taken);
         check = check + dot(&elastic, &elastic);
         // Which lanes are active is not known yet: an element with a fault ends the run before its state is used.
