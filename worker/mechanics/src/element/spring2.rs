@@ -26,12 +26,12 @@ pub const FORCE: usize = 0;
 pub(crate) const PLASTIC: usize = 1;
 /// Index of the sum of its plastic changes of length (length).
 pub(crate) const SLIP: usize = 2;
-/// Index of `w^2`, the sum over both ends of the stiffness of all springs there over the mass (1/time squared). It stays.
-pub(crate) const STIFF: usize = 3;
-/// Index of `g`, the same of damping (1/time). It stays.
-pub(crate) const DAMPED: usize = 4;
 /// Indices of the rates of the length in the last step and in that before it (velocity).
-pub(crate) const RATES: [usize; 2] = [5, 6];
+pub(crate) const RATES: [usize; 2] = [3, 4];
+/// Index of `w^2`, the sum over both ends of the stiffness of all springs there over the mass (1/time squared). It stays.
+pub(crate) const STIFF: usize = 5;
+/// Index of `g`, the same of damping (1/time). It stays.
+pub(crate) const DAMPED: usize = 6;
 
 /// Longest step over the [stable](stable_step) one. With a safety factor of 2/3 a lone spring swings 0.8 % too fast.
 const RESOLVED: f64 = 1.0 / 3.0;
