@@ -234,3 +234,52 @@ def test_ten_node_tetrahedra_are_mirrored_with_positive_volumes(tmp_path: Path) 
     for cell in order:
         for node, (a, b) in zip(cell[4:], edges, strict=True):
             assert whole.points[node] == pytest.approx((whole.points[cell[a]] + whole.points[cell[b]]) / 2)
+
+
+def test_runs_of_a_loop_have_results_of_their_own() -> None:
+    runs = [ball_on_plate(speed).run(cycles=5, progress=False) for speed in (700.0, 800.0)]
+    assert [run.folder.name for run in runs] == ["ball-plate", "ball-plate-2"]
+    speeds = [run["ball"].initial_velocity[2] for run in runs]
+    assert speeds == pytest.approx([-700, -800])
+    assert runs[0].digest != runs[1].digest
+    with pytest.raises(bo.DeckError):
+        wrong = ball_on_plate()
+        wrong["ball"].table["material"] = "STEAL_4340"
+        wrong.run(progress=False)
+    assert ball_on_plate().run(cycles=5, progress=False).folder.name == "ball-plate-3"
+
+
+def test_a_folder_that_another_run_wrote_to_is_an_error_and_one_under_way_is_read_anew() -> None:
+    first = ball_on_plate(700).run(out="mine", cycles=5, progress=False)
+    second = ball_on_plate(800).run(out="mine", cycles=5, force=True, progress=False)
+    for ask in (lambda: first.history, lambda: first.mesh(), lambda: first.times, lambda: first.picture()):
+        with pytest.raises(bo.BolideError, match=f"{first.digest} are gone.*{second.digest}"):
+            ask()
+    assert second.history["cycle"].iloc[-1] == 4
+    # As a run under way has it.
+    summary = second.folder / "summary.json"
+    text, rows = summary.read_text(), (second.folder / "history.csv").read_text()
+    summary.unlink()
+    (second.folder / "history.csv").write_text("\n".join(rows.splitlines()[:2]) + "\n")
+    going = bo.Result(second.folder)
+    assert (going.summary, going.parts, len(going.history)) == ({}, [], 1)
+    (second.folder / "history.csv").write_text(rows)
+    summary.write_text(text)
+    assert (going.digest, len(going.parts), len(going.history)) == (second.digest, 2, 2)
+
+
+def test_a_state_has_one_number_or_a_finite_time(result: bo.Result) -> None:
+    with pytest.raises(bo.BolideError, match="give one of both"):
+        result.mesh(1, time=0.01)
+    with pytest.raises(bo.BolideError, match="no finite number"):
+        result.mesh(time=math.nan)
+
+
+def test_the_reason_of_a_refusal_is_not_its_last_line() -> None:
+    from bolide.binary import reason_of
+
+    refused = "error: invalid value 'x' for '--state'\n\nUsage: bolide picture\n\nFor more information, try '--help'.\n"
+    assert reason_of(refused) == "invalid value 'x' for '--state'"
+    panic = "thread 'main' panicked at src/a.rs:1:2:\nno room\nnote: run with `RUST_BACKTRACE=1`\n"
+    assert reason_of(panic) == "thread 'main' panicked at src/a.rs:1:2: no room"
+    assert reason_of("a word\nbolide: why\n  more\n") == "why\n  more"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
@@ -56,11 +57,20 @@ def call(arguments: Sequence[str], cwd: Path | None = None) -> subprocess.Comple
 
 
 def reason_of(stderr: str) -> str:
-    """What the binary said last on standard error: its reason, which may have several lines."""
+    """What the binary said last on standard error: its reason, which may have several lines.
+
+    Refused flags are an `error:` with usage below, a fault of the program is a panic with notes below.
+    """
     lines = stderr.strip().splitlines()
     for at in range(len(lines) - 1, -1, -1):
         if lines[at].startswith("bolide: "):
             return "\n".join([lines[at][len("bolide: ") :], *lines[at + 1 :]])
+    for at, line in enumerate(lines):
+        if line.startswith("error:"):
+            paragraph = itertools.takewhile(str.strip, lines[at:])
+            return " ".join(words.strip() for words in paragraph).removeprefix("error:").strip()
+        if "panicked at" in line:
+            return " ".join([line, *lines[at + 1 : at + 2]])
     return lines[-1] if lines else "the binary said nothing"
 
 

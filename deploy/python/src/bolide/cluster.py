@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from . import binary, progress
+from . import binary, folders, progress
 from .deck import Deck, Progress, check
 from .errors import ClusterError, RunError
 from .results import Result
@@ -84,7 +84,8 @@ class Cluster:
             min_memory: wait for workers with so many GB together.
             priority: jobs of a higher priority start first.
             cycles: stop after so many.
-            out: folder for the results; by default `results/NAME` by the title, whose earlier results are replaced.
+            out: folder for the results; by default `results/NAME` by the title, where results of an earlier process are
+                replaced; a further job of the same process has `results/NAME-2` and so on.
             force: whether results in `out` are replaced.
             progress: as for :func:`bolide.run`.
 
@@ -93,11 +94,15 @@ class Cluster:
             ClusterError: if the master does not answer or refuses.
             RunError: if the job fails.
         """
-        if isinstance(deck, Deck):
-            path = deck.write(Path("results") / f"{deck.slug}.toml")
-        else:
-            path = Path(deck)
-        forecast = check(path)
+        name = deck.slug if isinstance(deck, Deck) else Path(deck).stem
+        folder, force = (folders.take(Path("results") / name), True) if out is None else (folders.use(Path(out)), force)
+        try:
+            path = deck.write(folder.with_name(folder.name + ".toml")) if isinstance(deck, Deck) else Path(deck)
+            forecast = check(path)
+        except BaseException:
+            if out is None:
+                folders.give_back(folder)
+            raise
         workers = f"{min_workers}..{max_workers or ''}"
         arguments = ["submit", str(path), "--workers", workers, "--priority", str(priority)]
         arguments += ["--min-speed", str(min_speed), "--min-memory", str(min_memory)]
@@ -107,8 +112,7 @@ class Cluster:
         job = Job(self, number, path, list(forecast.warnings), end, cycles)
         if not wait:
             return job
-        folder = Path("results") / path.stem if out is None else Path(out)
-        return job.wait(progress=progress).result(folder, force=force or out is None)
+        return job.wait(progress=progress).result(folder, force=force)
 
     def jobs(self) -> pd.DataFrame:
         """Jobs of the master, oldest first."""
@@ -177,6 +181,7 @@ class Job:
         self._warnings = warnings
         self._end_time = end_time
         self._cycles = cycles
+        self._folder: Path | None = None
 
     def __repr__(self) -> str:
         return f"<job {self.number} of {self.cluster.master}: {self.state}>"
@@ -234,8 +239,13 @@ class Job:
         return self
 
     def result(self, folder: str | Path | None = None, *, force: bool = False) -> Result:
-        """Fetches its results into a folder, by default `results/job-N`."""
-        path = Path(folder) if folder is not None else Path("results") / f"job-{self.number}"
+        """Fetches its results into a folder, by default `results/job-N`.
+
+        Job N of another master has `results/job-N-2` in the same process. What is in the folder is replaced with `force` only.
+        """
+        if folder is None:
+            folder = self._folder = self._folder or folders.take(Path("results") / f"job-{self.number}")
+        path = folders.use(Path(folder))
         arguments = ["results", str(self.number), "--out", str(path), *(["--force"] if force else [])]
         self.cluster._ask(*arguments)
         return Result(path, warnings=self._warnings, deck=self._deck)

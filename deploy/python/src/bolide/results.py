@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import tempfile
 import tomllib
 import xml.etree.ElementTree as ElementTree
@@ -104,6 +105,8 @@ class GaugeResult:
 class Result:
     """A folder of results, also of a run that is under way or was ended.
 
+    What is read later is of the same run: once another has written to the folder, that is an error.
+
     Args:
         folder: the folder, as `bolide run` or `bolide results` writes it.
         warnings: what was told of the deck before the run.
@@ -114,21 +117,41 @@ class Result:
         self.folder = Path(folder)
         self._warnings = tuple(warnings)
         self.deck = deck
+        self._summary: dict[str, Any] = {}
+        self._history: History | None = None
         if not (self.folder / "history.csv").is_file():
             raise BolideError(f"{self.folder}: no results (no history.csv); a run writes them there")
+        self._look()
 
     def __repr__(self) -> str:
         return f"<results of {self.summary.get('title', 'a run under way')!r} in {self.folder}>"
 
-    @cached_property
+    def _look(self) -> bool:
+        """Whether the run is over, by the summary that is in the folder now.
+
+        Raises:
+            BolideError: if it is of another run than before.
+        """
+        try:
+            now: dict[str, Any] = json.loads((self.folder / "summary.json").read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            now = {}
+        before = self._summary.get("digest")
+        if before is not None and now.get("digest") != before:
+            found = f"one of digest {now['digest']}" if "digest" in now else "a run under way, or nothing whole"
+            raise BolideError(
+                f"{self.folder}: the results of digest {before} are gone, another run wrote there; now it has {found}: "
+                "read it by bolide.Result(folder), and give each run a folder of its own with out="
+            )
+        self._summary = self._summary or now
+        return bool(self._summary)
+
+    @property
     def summary(self) -> dict[str, Any]:
         """`summary.json`; empty while the run is under way."""
-        try:
-            text = (self.folder / "summary.json").read_text(encoding="utf-8")
-        except FileNotFoundError:
-            return {}
-        whole: dict[str, Any] = json.loads(text)
-        return whole
+        if not self._summary:
+            self._look()
+        return self._summary
 
     @property
     def digest(self) -> str:
@@ -142,18 +165,27 @@ class Result:
         """What is doubtful in the deck and in the results."""
         return [*self._warnings, *self.summary.get("warnings", [])]
 
-    @cached_property
+    @property
     def history(self) -> History:
-        """The history over time, with plain names: `kinetic`, `plate.internal`, `rear.vz`; `ball.vz` is a mean velocity of a part."""
+        """The history over time, with plain names: `kinetic`, `plate.internal`, `rear.vz`; `ball.vz` is a mean velocity of a part.
+
+        While the run is under way it is read anew each time.
+        """
+        if self._history is not None:
+            return self._history
+        over = self._look()
         rows = history.read(self.folder / "history.csv")
-        return history.with_velocities(rows, {part.name: part.mass for part in self.parts})
+        whole = history.with_velocities(rows, {part.name: part.mass for part in self.parts})
+        if over:
+            self._history = whole
+        return whole
 
     @property
     def units(self) -> dict[str, str]:
         """Unit of each column of the history, and of `time`."""
         return self.history.units
 
-    @cached_property
+    @property
     def parts(self) -> list[PartResult]:
         """Its parts, in the order of the deck; none while the run is under way."""
         energies = self.summary.get("energies", {})
@@ -206,6 +238,7 @@ class Result:
         return [time for time, _ in self._states()]
 
     def _states(self) -> list[tuple[float, Path]]:
+        self._look()
         try:
             root = ElementTree.parse(self.folder / "results.pvd").getroot()
         except FileNotFoundError:
@@ -215,19 +248,20 @@ class Result:
 
     @cached_property
     def symmetry(self) -> tuple[str, ...]:
-        """Planes of symmetry of the deck, such as `("x", "y")`, by the deck that was run or the one kept with the results."""
-        for path in (self.deck, self.folder / "input.deck"):
+        """Planes of symmetry of the deck, such as `("x", "y")`, by the deck that is kept with the results, else by the file that was run."""
+        self._look()
+        for path in (self.folder / "input.deck", self.deck):
             if path is not None and path.is_file():
                 planes = _planes(path)
                 if planes is not None:
                     return planes
         return ()
 
-    def mesh(self, index: int | None = -1, *, time: float | None = None) -> State:
+    def mesh(self, index: int | None = None, *, time: float | None = None) -> State:
         """A state as a mesh of pyvista.
 
         Args:
-            index: number of the state, counted from the end where it is negative; or
+            index: number of the state, counted from the end where it is negative; by default the last. Or
             time: its time (the deck's unit); the nearest is taken.
         """
         from .state import State
@@ -235,6 +269,10 @@ class Result:
         states = self._states()
         if not states:
             raise BolideError(f"{self.folder}: no states; a deck with a period in [output] writes them")
+        if index is not None and time is not None:
+            raise BolideError(f"state {index} and the time {time}: give one of both")
+        if time is not None and not math.isfinite(time):
+            raise BolideError(f"the time of a state is {time}, which is no finite number; there are {states[0][0]:g} to {states[-1][0]:g}")
         if time is not None:
             found = min(states, key=lambda state: abs(state[0] - time))
         else:
@@ -272,8 +310,8 @@ class Result:
             size: width and height (pixels).
             edges: whether edges of elements are drawn.
         """
-        path = Path(out) if out is not None else Path(tempfile.mkstemp(suffix=".png")[1])
-        arguments = ["picture", str(self.folder), "--field", field, "--out", str(path)]
+        self._look()
+        arguments = ["picture", str(self.folder), "--field", field]
         options = {"state": state, "time": time, "view": view, "cut": cut, "width": size[0], "height": size[1]}
         for flag, value in options.items():
             arguments += [] if value is None else [f"--{flag}={value}"]
@@ -284,8 +322,11 @@ class Result:
             if name not in names:
                 raise unknown("part", name, names)
             arguments += ["--part", str(names.index(name))]
-        done = binary.call([*arguments, *([] if edges else ["--no-edges"])])
+        path = Path(out) if out is not None else _temporary(".png")
+        done = binary.call([*arguments, f"--out={path}", *([] if edges else ["--no-edges"])])
         if done.returncode != 0:
+            if out is None:
+                path.unlink(missing_ok=True)
             raise BolideError(binary.reason_of(done.stderr))
         return Picture(path)
 
@@ -301,6 +342,13 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         return self.path.read_bytes()
+
+
+def _temporary(suffix: str) -> Path:
+    """A new file, which stays."""
+    handle, name = tempfile.mkstemp(suffix=suffix)
+    os.close(handle)
+    return Path(name)
 
 
 def _planes(path: Path) -> tuple[str, ...] | None:

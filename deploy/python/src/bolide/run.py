@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from . import binary, progress
+from . import binary, folders, progress
 from .deck import Deck, Progress, check, reading_flags
 from .errors import DeckError, RunError
 from .results import Result
@@ -45,7 +45,8 @@ def run(
         threads: of each worker; by default the cores that it may use.
         speeds: relative speeds of the workers.
         processes: whether each worker is a process of its own.
-        out: folder of the results; by default `results/NAME` by the title, whose earlier results are replaced.
+        out: folder of the results; by default `results/NAME` by the title, where results of an earlier process are
+            replaced; a further run of the same process has `results/NAME-2` and so on, so that each result keeps its own.
         force: whether results in `out` are replaced.
         cycles: stop after so many.
         end_time: stop at this time.
@@ -59,14 +60,15 @@ def run(
         RunError: if the run ends before its end; its `result` is what was written.
         KeyboardInterrupt: after the checkpoint was saved.
     """
-    if isinstance(deck, Deck):
-        # The deck's own default is replaced, as a cell of a notebook that is run again replaces it.
-        folder, force = (Path("results") / deck.slug, True) if out is None else (Path(out), force)
-        path = deck.write(folder.with_name(folder.name + ".toml"))
-    else:
-        path = Path(deck)
-        folder, force = (Path("results") / path.stem, True) if out is None else (Path(out), force)
-    forecast = check(path, units=units, set=set)
+    name = deck.slug if isinstance(deck, Deck) else Path(deck).stem
+    folder, force = (folders.take(Path("results") / name), True) if out is None else (folders.use(Path(out)), force)
+    try:
+        path = deck.write(folder.with_name(folder.name + ".toml")) if isinstance(deck, Deck) else Path(deck)
+        forecast = check(path, units=units, set=set)
+    except BaseException:
+        if out is None:
+            folders.give_back(folder)
+        raise
     arguments = ["run", str(path), "--json", "--out", str(folder), *reading_flags(units, set), *flags]
     for flag, value in {"workers": workers, "threads": threads, "cycles": cycles, "end-time": end_time}.items():
         arguments += [] if value is None else [f"--{flag}", str(value)]
@@ -76,6 +78,8 @@ def run(
     code, reason = _follow(arguments, folder, end, cycles, progress)
     if code == 0:
         return Result(folder, warnings=forecast.warnings, deck=path)
+    if out is None and not (folder / "history.csv").is_file():
+        folders.give_back(folder)
     partly = Result(folder, warnings=forecast.warnings, deck=path) if (folder / "history.csv").is_file() else None
     if code == 130:
         raise KeyboardInterrupt(reason)
