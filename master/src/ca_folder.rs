@@ -194,10 +194,15 @@ impl CaFolder {
     /// # Errors
     /// If the list is there and cannot be read.
     pub fn revoked(&self) -> Result<BTreeSet<String>, Error> {
+        Ok(self.list()?.unwrap_or_default())
+    }
+
+    /// The same; none where there is no list.
+    fn list(&self) -> Result<Option<BTreeSet<String>>, Error> {
         let path = self.folder.join("revoked");
         let fault = |error| Error::Io { path: path.clone(), error };
         match fs::metadata(&path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(BTreeSet::new()),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(fault(error)),
             Ok(meta) if meta.len() > REVOKED_LIMIT => {
                 let (path, length) = (path.display(), meta.len());
@@ -206,11 +211,11 @@ impl CaFolder {
             Ok(_) => {}
         }
         let text = fs::read_to_string(&path).map_err(fault)?;
-        Ok(text.split_whitespace().map(str::to_owned).collect())
+        Ok(Some(text.split_whitespace().map(str::to_owned).collect()))
     }
 
-    /// The list of revoked certificates, looked at again and again. A list that cannot be read any more stays what it
-    /// was. Called within a runtime.
+    /// The list of revoked certificates, looked at again and again. A list that cannot be read any more, or is
+    /// gone, stays what it was. Called within a runtime.
     ///
     /// # Errors
     /// If it cannot be read at first.
@@ -222,10 +227,29 @@ impl CaFolder {
             loop {
                 tokio::time::sleep(LOOK).await;
                 let ca_folder = ca_folder.clone();
-                let read = tokio::task::spawn_blocking(move || ca_folder.revoked()).await;
+                let read =
+                    tokio::task::spawn_blocking(move || ca_folder.list().map(|list| (list, ca_folder))).await;
+                let known = news.borrow().clone();
                 match read {
-                    Ok(Ok(list)) => {
+                    // None is there before the first certificate is revoked.
+                    Ok(Ok((None, _))) if known.is_empty() => told = false,
+                    Ok(Ok((None, ca_folder))) if !told => {
+                        told = true;
+                        let path = ca_folder.folder.join("revoked");
+                        let (path, count) = (path.display(), known.len());
+                        tracing::warn!(
+                            "{path} is gone, which named {count} certificates; they stay revoked until this master ends: put it back, or \
+                             `bolide certs revoke` them again"
+                        );
+                    }
+                    Ok(Ok((Some(list), _))) => {
                         told = false;
+                        let again = known.difference(&list).count();
+                        if again > 0 {
+                            tracing::warn!(
+                                "the list of revoked certificates has lost {again}, which count again"
+                            );
+                        }
                         news.send_if_modified(|known| {
                             let changed = **known != list;
                             *known = Arc::new(list);
@@ -347,5 +371,22 @@ mod tests {
         assert!(
             ca_folder.revoke("pc-3").expect_err("nobody").to_string().contains("no certificate was issued")
         );
+    }
+
+    #[tokio::test]
+    async fn a_list_that_goes_missing_leaves_nobody_unrevoked() {
+        let (folder, ca_folder) = ca_folder();
+        certs::make_host(folder.path(), "pc-1", &[], Role::Worker, false).expect("a host");
+        certs::make_host(folder.path(), "pc-2", &[], Role::Worker, false).expect("a host");
+        let mut revoked = ca_folder.follow().expect("no list yet");
+        assert!(revoked.borrow().is_empty());
+        ca_folder.revoke("pc-1").expect("it was issued");
+        revoked.wait_for(|list| list.len() == 1).await.expect("followed");
+        fs::remove_file(folder.path().join("revoked")).expect("there");
+        tokio::time::sleep(2 * LOOK).await;
+        assert_eq!(revoked.borrow().len(), 1);
+        ca_folder.revoke("pc-2").expect("it was issued");
+        revoked.changed().await.expect("followed");
+        assert_eq!(**revoked.borrow(), ca_folder.revoked().expect("readable"));
     }
 }
