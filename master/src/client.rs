@@ -9,6 +9,7 @@ use std::{
 
 use clap::ValueEnum;
 use protocol::{
+    Error,
     codec::{self, MESSAGE_LIMIT},
     dial::{self, Call},
     frame::Kind,
@@ -26,7 +27,7 @@ use crate::{
     deck_file::{self, doubt, gather_deck, warn},
     machine::host_name,
     output::span,
-    results::{Folder, Summary, Units, create_anew, summary::significant},
+    results::{Folder, SUMMARY, Summary, Units, create_anew, summary::significant, temporary_of},
     shell::{print, quoted, tell},
 };
 
@@ -83,7 +84,10 @@ impl Client {
             .map_err(|e| format!("threads of the link: {e}"))?;
         let hello = Hello::new(Role::Client, host_name(), 1.0, 1, "none", worker::random());
         let call = runtime.block_on(dial::dial(&at.master, certificates.as_ref(), &hello));
-        let Call { sender, receiver, welcome, .. } = call.map_err(|e| e.to_string())?;
+        let Call { sender, receiver, welcome, .. } = call.map_err(|e| match e {
+            Error::Silent { .. } => format!("the master at {} {}", at.master, silence(&e)),
+            e => e.to_string(),
+        })?;
         Ok(Self {
             runtime,
             outbox: Outbox::new(sender, welcome.incarnation),
@@ -116,9 +120,12 @@ impl Client {
                 inbox.accept(receiver.receive().await?)?;
             }
         });
-        let letter = letter.map_err(|e: protocol::Error| {
+        let letter = letter.map_err(|e: Error| {
             self.gone = true;
-            format!("the master: {e}")
+            match e {
+                Error::Silent { .. } => format!("the master {}", silence(&e)),
+                e => format!("the master: {e}"),
+            }
         })?;
         match codec::decode(&letter.bytes, MESSAGE_LIMIT).map_err(|e| e.to_string())? {
             Reply::No(why) => Err(why),
@@ -191,6 +198,11 @@ impl Drop for Client {
     fn drop(&mut self) {
         self.runtime.block_on(dial::leave(self.outbox.sender(), "done"));
     }
+}
+
+/// Of a master that takes connections and says nothing.
+fn silence(error: &Error) -> String {
+    format!("does not answer ({error}): it is stopped or overloaded; look at its log, or start it again")
 }
 
 fn surprise() -> String {
@@ -475,14 +487,24 @@ pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> 
     let folder = out.unwrap_or_else(|| Path::new("results").join(format!("job-{job}")));
     let mut client = Client::new(at)?;
     let Reply::Files(files) = client.ask(&Request::Files { job })? else { return Err(surprise()) };
-    let taken = Folder::create(&folder, force).map_err(|e| e.to_string())?;
-    let mut total = 0;
-    for (name, _) in &files {
-        // The master is believed no more than any other peer.
-        check_file_name(name)?;
-        total += client.fetch(job, name, &folder.join(name))?;
-    }
+    let is_new = !folder.exists();
+    let taken = Folder::claim(&folder, force).map_err(|e| e.to_string())?;
+    let fetched = fetch_all(&mut client, job, &files, &taken);
+    let total = fetched.inspect_err(|_| {
+        for (name, _) in &files {
+            // What does not bear the name of a file was not written.
+            let _ = temporary_of(&folder.join(name)).map(std::fs::remove_file);
+        }
+        if is_new {
+            let _ = std::fs::remove_dir(&folder);
+        }
+    })?;
     drop(taken);
+    if !files.iter().any(|(name, _)| name == SUMMARY) {
+        tell(&format!(
+            "job {job} has no {SUMMARY}: it runs, or did not come to an end; these are its results so far"
+        ));
+    }
     if at.json {
         let names: Vec<&String> = files.iter().map(|(name, _)| name).collect();
         print(&serde_json::to_string(&names).map_err(|e| e.to_string())?)?;
@@ -490,6 +512,27 @@ pub fn results(job: u32, out: Option<PathBuf>, force: bool, at: &ClientArgs) -> 
         print(&format!("{} files, {total} bytes in {}", files.len(), folder.display()))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Fetches files under temporary names; they have their own, in place of what stood there, once all are whole. Gives their length (bytes).
+fn fetch_all(client: &mut Client, job: u32, files: &[(String, u64)], folder: &Folder) -> Result<u64, String> {
+    let mut total = 0;
+    let mut whole = Vec::new();
+    for (name, _) in files {
+        // The master is believed no more than any other peer.
+        check_file_name(name)?;
+        let path = folder.file(name);
+        let temporary = temporary_of(&path).ok_or_else(|| format!("{name:?} names no file"))?;
+        total += client.fetch(job, name, &temporary)?;
+        whole.push((temporary, path));
+    }
+    folder
+        .clear_but(|path| whole.iter().any(|(temporary, _)| temporary == path))
+        .map_err(|e| e.to_string())?;
+    for (temporary, path) in whole {
+        std::fs::rename(&temporary, &path).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    Ok(total)
 }
 
 #[cfg(test)]

@@ -212,9 +212,17 @@ impl Folder {
     /// # Errors
     /// [`Error::Io`] if the folder cannot be listed or cleared.
     pub fn clear(&self) -> Result<(), Error> {
+        self.clear_but(|_| false)
+    }
+
+    /// The same, without those of some paths.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the folder cannot be listed or cleared.
+    pub fn clear_but(&self, stays: impl Fn(&Path) -> bool) -> Result<(), Error> {
         for entry in fs::read_dir(&self.path).map_err(Error::io("read", &self.path))? {
             let entry = entry.map_err(Error::io("read", &self.path))?;
-            if entry.file_name().to_str().is_some_and(is_written_by_a_run) {
+            if entry.file_name().to_str().is_some_and(is_written_by_a_run) && !stays(&entry.path()) {
                 fs::remove_file(entry.path()).map_err(Error::io("remove", &entry.path()))?;
             }
         }
@@ -351,7 +359,7 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
 }
 
 /// The temporary name `.NAME.tmp` beside a file; none where the path names no file.
-fn temporary_of(path: &Path) -> Option<PathBuf> {
+pub fn temporary_of(path: &Path) -> Option<PathBuf> {
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(path.file_name()?);
     hidden.push(".tmp");
