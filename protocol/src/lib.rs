@@ -185,6 +185,10 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            // The first bytes of an alert or of a greeting of TLS.
+            Self::Magic { found: [0x15 | 0x16, 3, ..] } => f.write_str(
+                "the peer speaks TLS, and this side has no certificates: give --certs FOLDER, as `bolide certs host` makes it",
+            ),
             Self::Magic { found } => write!(
                 f,
                 "frame starts with {found:02x?}, expected {:02x?}; the peer is not a bolide",
@@ -239,3 +243,16 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_in_tls_is_told_as_such() {
+        for found in [[0x15, 3, 3, 0], [0x16, 3, 1, 2]] {
+            assert!(Error::Magic { found }.to_string().contains("speaks TLS"), "{found:?}");
+        }
+        assert!(Error::Magic { found: *b"HTTP" }.to_string().ends_with("is not a bolide"));
+    }
+}

@@ -260,7 +260,8 @@ where
     let name = ServerName::try_from(host.to_owned())
         .map_err(|_| Error::Certificate(format!("{host:?} is neither a host's name nor an address")))?;
     let stream = BufReader::with_capacity(READ_BUFFER, stream);
-    let stream = in_time(TlsConnector::from(Arc::clone(config)).connect(name, stream)).await?;
+    let shaken = in_time(TlsConnector::from(Arc::clone(config)).connect(name, stream)).await;
+    let stream = shaken.map_err(doubt_tls)?;
     let shown = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
     let identity = identity(shown.ok_or_else(no_certificate)?)?;
     if !roles.contains(&identity.role) {
@@ -282,6 +283,19 @@ async fn in_time<T>(handshake: impl Future<Output = std::io::Result<T>>) -> Resu
             let why = format!("not done after {} s", HANDSHAKE_LIMIT.as_secs());
             Err(Error::Io { doing: "TLS handshake".into(), kind, why })
         }
+    }
+}
+
+/// A peer without certificates hangs up on who begins with TLS.
+fn doubt_tls(error: Error) -> Error {
+    use std::io::ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset, UnexpectedEof};
+    match error {
+        Error::Io { doing, kind, why }
+            if matches!(kind, UnexpectedEof | ConnectionReset | ConnectionAborted | BrokenPipe) =>
+        {
+            Error::Io { doing, kind, why: format!("{why}; it may run without certificates") }
+        }
+        error => error,
     }
 }
 

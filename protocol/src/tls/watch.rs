@@ -26,7 +26,7 @@ impl Identity {
         }
         let now = now.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() as i64);
         (now > *expires).then(|| {
-            format!("the certificate of {role} {name:?} has expired; make another with `bolide certs`")
+            format!("the certificate of {role} {name:?} has expired; make another with `bolide certs`, and start it again")
         })
     }
 }

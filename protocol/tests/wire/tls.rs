@@ -409,3 +409,17 @@ async fn a_certificate_that_expires_or_is_revoked_ends_the_link_that_it_made_wit
         assert!(ended.contains(words) || ended == "connection closed", "{ended}");
     }
 }
+
+#[tokio::test]
+async fn a_peer_that_hangs_up_on_tls_may_run_without_certificates() {
+    let (_f, paths) = Authority::new("lab").host("bolide:worker", usual);
+    let client = tls::client_config(&paths).expect("usable");
+    let (near, mut far) = tokio::io::duplex(4096);
+    let hang_up = async move {
+        let mut said = [0; 16];
+        tokio::io::AsyncReadExt::read_exact(&mut far, &mut said).await.expect("a greeting");
+    };
+    let (told, ()) = tokio::join!(tls::connect(near, "127.0.0.1", &client, tls::Role::Master), hang_up);
+    let text = told.expect_err("nobody there").to_string();
+    assert!(text.ends_with("in the middle; it may run without certificates"), "{text}");
+}
