@@ -266,6 +266,8 @@ async fn stay(process: Process, mut hello: Hello, slot: Slot) -> std::result::Re
     let mut listening = None;
     let mut alone_since = Instant::now();
     let mut pause = FIRST_PAUSE;
+    // Why the master was not reached, as it was told last.
+    let mut told_why = None;
     loop {
         let away = told.away.borrow().clone();
         if let Some(why) = away {
@@ -283,6 +285,7 @@ async fn stay(process: Process, mut hello: Hello, slot: Slot) -> std::result::Re
         let joined = join(&options, certificates.as_ref(), &mut hello, &mut listening, &mut service).await;
         let error = match joined {
             Ok(call) => {
+                told_why = None;
                 info!(
                     host = call.welcome.host,
                     incarnation = call.welcome.incarnation,
@@ -307,7 +310,15 @@ async fn stay(process: Process, mut hello: Hello, slot: Slot) -> std::result::Re
                 error
             }
             Err(error) if is_final(&error) => return Err(error.to_string()),
-            Err(error) => error,
+            Err(error) => {
+                let why = error.to_string();
+                if told_why.as_ref() != Some(&why) {
+                    let seconds = options.patience.saturating_sub(alone_since.elapsed()).as_secs();
+                    warn!("no master at {}: {why}; dialling again for {seconds} s", options.master);
+                    told_why = Some(why);
+                }
+                error
+            }
         };
         if alone_since.elapsed() >= options.patience {
             let seconds = options.patience.as_secs();
