@@ -23,8 +23,27 @@ const fault = error => {
   const box = $('faults');
   if (error.faults) lists.faults(box, deck?.name ?? '', error.faults, deck?.texts ?? new Map());
   else lists.say(box, [deck?.name, error.message].filter(Boolean).join(': '));
+  if (error.faults && !$('deck').hidden) outdate();
   $('submit-box').open = true;
 };
+
+/// The text in the editor has faults: what the card told is of the text before.
+function outdate() {
+  $('doubts').replaceChildren(lists.element('li', { className: 'bad' }, lists.element('b', { textContent: 'faults' }), ' in the text as it is now, at the lines that are listed under Submit'));
+  $('forecast').textContent = '';
+  lists.table($('deck-parts'), []);
+  $('deck-bodies').hidden = true;
+}
+
+/// A whole number that stands in a field, or null. Throws where it is none.
+function whole(id, what) {
+  const field = $(id);
+  if (!field.checkValidity()) {
+    field.focus();
+    throw new Error(`${what} is ${field.value || 'no number'}: expected a whole number from ${field.min} to ${Number(field.max).toLocaleString('en')}`);
+  }
+  return field.value === '' ? null : Number(field.value);
+}
 
 /// Looks at a deck that has come, a promise of files.
 export async function take(coming) {
@@ -105,16 +124,22 @@ function changed() {
 }
 
 async function run() {
-  if (!deck) return;
+  // A second click would submit the deck twice.
+  if (!deck || $('run').disabled) return;
+  $('run').disabled = $('discard').disabled = true;
   try {
+    const workers = whole('min-workers', 'the number of workers to start with') ?? 1, cycles = whole('cycles', 'the number of cycles');
     deck = changed();
-    const query = new URLSearchParams({ name: deck.name, min_workers: $('min-workers').value || '1' });
-    if ($('cycles').value) query.set('cycles', $('cycles').value);
+    const query = new URLSearchParams({ name: deck.name, min_workers: workers });
+    if (cycles !== null) query.set('cycles', cycles);
+    $('faults').hidden = true;
     const { job } = await json(`api/jobs?${query}`, { method: 'POST', body: deck.text });
     close();
     await ran(job);
   } catch (error) {
     fault(error);
+  } finally {
+    $('run').disabled = $('discard').disabled = false;
   }
 }
 

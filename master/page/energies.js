@@ -27,13 +27,15 @@ export function draw(sheet) {
     ? `Energies in ${units.energy} at ${lists.number(latest.time)} ${units.time}: ${series.map(s => `${s.name} ${lists.number(latest[s.key], 3)}`).join(', ')}`
     : 'Energies: no points yet');
   curves.legend($('legend'), series.map(s => ({ ...s, words: latest ? `${s.name} ${lists.number(latest[s.key], 3)}` : s.name })));
-  $('balance').parentElement.hidden = !imbalance.length;
-  if (!imbalance.length) return;
+  // Of a job that is over no second point comes.
+  const hidden = imbalance.length < (sheet.final ? 2 : 1);
+  $('balance').parentElement.hidden = hidden;
+  if (hidden) return;
   curves.draw($('balance'), {
     x: imbalance.map(p => p[0]), xName: 'cycle', yName: '', floor: [1, 1.2],
     series: [{ colour: '--c0', y: runningMedian(imbalance.map(p => p[1])) }],
   });
-  const ratio = sheet.brief.imbalance;
+  const ratio = sheet.brief.imbalance ?? imbalance.at(-1)[1];
   $('balance').setAttribute('aria-label', ratio ? `Imbalance over ${imbalance.length} cycles, lately ${ratio.toFixed(3)}` : 'Imbalance: no points yet');
 }
 

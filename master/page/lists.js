@@ -118,7 +118,7 @@ export function faults(box, name, list, texts) {
       element('pre', {}, line.slice(0, at), element('mark', { textContent: word }), line.slice(at + word.length)),
       `read ${fault.read}; expected ${fault.expected}; ${fault.advice}`);
   });
-  const title = `${name}: ${list.length} ${list.length === 1 ? 'fault' : 'faults'}; it was not submitted`;
+  const title = `${name}: ${list.length} ${list.length === 1 ? 'fault' : 'faults'}; it cannot run`;
   box.replaceChildren(element('h4', { textContent: title }), element('ol', {}, ...items));
   box.hidden = false;
   box.focus();

@@ -1,7 +1,7 @@
 // The page: hears the overview as a stream, asks for the chosen job's sheet, and hands both to what draws.
 
 import * as again from './again.js';
-import { ask, json, root } from './ask.js';
+import { ask, behind, json, root } from './ask.js';
 import * as deck from './deck.js';
 import * as energies from './energies.js';
 import * as facts from './facts.js';
@@ -17,8 +17,10 @@ const $ = id => document.getElementById(id);
 const NARROW = 860;
 /// How often the history of a run under way is asked for (s).
 const HISTORY_EVERY = 3;
+/// The stream says something at least every 10 s; after so long without a word (s) the page says that.
+const SILENCE = 25;
 
-const page = { overview: null, chosen: null, sheet: null, beside: null, asking: false, ticks: 0 };
+const page = { overview: null, chosen: null, sheet: null, beside: null, asking: false, ticks: 0, heard: Date.now() };
 
 function link(words, lost) {
   if ($('link').textContent !== words) $('link').textContent = words;
@@ -29,13 +31,27 @@ function listen() {
   const stream = new EventSource(new URL('api/events', root));
   stream.addEventListener('overview', event => {
     page.overview = JSON.parse(event.data);
-    link(page.overview.only_shows ? 'results on this PC' : 'live', false);
+    if (page.overview.only_shows) behind.name = 'bolide report';
+    heard();
     overview();
   });
+  stream.addEventListener('alive', heard);
   stream.onerror = () => {
-    link(`${page.overview?.only_shows ? 'bolide report' : 'the master'} does not answer; trying again`, true);
+    link(`${behind.name} does not answer; trying again`, true);
     if (stream.readyState === EventSource.CLOSED) setTimeout(listen, 2000);
   };
+}
+
+/// Something came over the stream.
+function heard() {
+  page.heard = Date.now();
+  if (page.overview) link(page.overview.only_shows ? 'results on this PC' : 'live', false);
+}
+
+/// A program that is stopped keeps its connections, so that nothing ends: only its silence shows.
+function listenForSilence() {
+  const silent = Math.round((Date.now() - page.heard) / 1e3);
+  if (silent >= SILENCE && !(page.overview && $('link').textContent.endsWith('trying again'))) link(`no word from ${behind.name} for ${silent} s`, true);
 }
 
 const statusOf = number => page.overview?.jobs.find(job => job.job === number);
@@ -227,6 +243,8 @@ function cancels() {
 
 /// Asks the master for a change of the chosen job.
 async function act(name) {
+  // A second click would ask again.
+  $(name).disabled = true;
   try {
     await ask(`api/jobs/${page.chosen}/${name}`, { method: 'POST' });
   } catch (error) {
@@ -234,6 +252,8 @@ async function act(name) {
     // In a narrow window the box is closed, and far from the button.
     $('submit-box').open = true;
     $('faults').focus();
+  } finally {
+    $(name).disabled = false;
   }
 }
 
@@ -266,6 +286,7 @@ function start() {
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
   listen();
   setInterval(() => document.hidden || sheet(), 1000);
+  setInterval(listenForSilence, 1000);
 }
 
 start();

@@ -60,7 +60,7 @@ export async function draw(chosen, beside) {
   const list = rows([one, other].filter(Boolean)).map(([name, unit, of]) => {
     const values = [one, other].filter(Boolean).map(of);
     const own = unit && other && [chosen, beside].map(run => unit(run.sheet.units));
-    if (own && own[0] !== own[1]) return [name, ...values.map((v, i) => `${tell(v)} ${own[i]}`), ''];
+    if (own && own[0] !== own[1]) return [name, ...values.map((v, i) => v === undefined ? tell(v) : `${tell(v)} ${own[i]}`), ''];
     const heading = unit ? `${name} (${unit(chosen.sheet.units)})` : name;
     if (!other) return [heading, tell(values[0])];
     const [a, b] = values, change = a === b ? 'equal' : a && b !== undefined ? `${lists.number(100 * (b - a) / Math.abs(a), 3)} %` : '';
@@ -95,7 +95,7 @@ export async function files(number) {
   if (states.length) {
     const inside = lists.element('ul', {}, ...states.map(item));
     const total = lists.bytes(states.reduce((sum, file) => sum + file.bytes, 0));
-    made.push(lists.element('li', {}, lists.element('details', {}, lists.element('summary', { textContent: `${states.length} files of states, ${total}` }), inside)));
+    made.push(lists.element('li', {}, lists.element('details', {}, lists.element('summary', { textContent: `${states.length} ${states.length === 1 ? 'file' : 'files'} of states, ${total}` }), inside)));
   }
   // Rebuilding would close what is open and take the focus away.
   const now = list.map(({ name, bytes }) => `${number}/${name}/${bytes}`).join();

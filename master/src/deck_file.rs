@@ -11,7 +11,7 @@ use deck::{
     physics,
 };
 
-use crate::shell::tell;
+use crate::shell::{quoted, tell};
 
 /// Reads and checks a deck.
 ///
@@ -63,6 +63,9 @@ pub fn gather_deck(path: &Path, options: &Reading) -> Result<String, Error> {
     let name = path.display().to_string();
     let fault = |why| Error::File { name: name.clone(), why };
     let text = bundle::bytes_of_deck(path).and_then(bundle::text_of).map_err(fault)?;
+    if let Some(deck) = deck_of_study(&text) {
+        return Err(fault(format!("this is a study of the deck {deck}: bolide study {}", quoted(&name))));
+    }
     let folder = folder_of(path);
     let mut open = |path: &str| {
         let (found, bytes) = read_in_any_case(path)?;
@@ -72,6 +75,17 @@ pub fn gather_deck(path: &Path, options: &Reading) -> Result<String, Error> {
         Some(Opened { text: String::from_utf8_lossy(&bytes).into_owned(), is_outside })
     };
     bundle::gather_from(&name, text, options, &mut open).map_err(Error::Bundle)
+}
+
+/// The deck that a text names which is a study, as `bolide study` takes it, and no deck itself.
+pub fn deck_of_study(text: &str) -> Option<String> {
+    // A deck may be long, and keyword decks are no TOML.
+    if !text.contains("[[parameter]]") && !text.contains("[[measure]]") {
+        return None;
+    }
+    let table: toml::Table = text.parse().ok()?;
+    let deck = table.get("deck")?.as_str()?;
+    (!table.contains_key("part") && !deck.chars().any(char::is_control)).then(|| deck.to_owned())
 }
 
 /// The folder of a deck, links followed as far as the deck itself.
@@ -145,6 +159,17 @@ impl From<Error> for String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_study_is_told_from_a_deck() {
+        let study =
+            "title = \"s\"\ndeck = \"d.toml\"\n[[parameter]]\nname = \"v\"\n[[measure]]\nname = \"m\"\n";
+        assert_eq!(deck_of_study(study).as_deref(), Some("d.toml"));
+        let part = "[[part]]\nname = \"a\"\n";
+        for deck in [part, &format!("{study}{part}"), "*KEYWORD\n$ [[parameter]]\n", "[[measure]]\n"] {
+            assert_eq!(deck_of_study(deck), None, "{deck}");
+        }
+    }
 
     #[test]
     fn an_include_is_found_in_any_case_where_only_one_file_fits() {

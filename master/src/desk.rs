@@ -20,7 +20,7 @@ use mechanics::initial;
 use protocol::options::{self, JobOptions};
 use tokio::sync::Semaphore;
 
-use crate::{footprint, http::surface, queue::Size};
+use crate::{deck_file::deck_of_study, footprint, http::surface, queue::Size};
 
 /// Longest name of a deck (bytes).
 const NAME_LIMIT: usize = 4096;
@@ -57,6 +57,8 @@ pub enum Error {
     Name(usize),
     /// It has these faults.
     Faults(Vec<Fault>),
+    /// It is a study of this deck.
+    Study(String),
     /// No run of it can start.
     Start(String),
     /// Reading it had a bug.
@@ -79,6 +81,10 @@ impl fmt::Display for Error {
                 let faults: Vec<String> = faults.iter().map(Fault::to_string).collect();
                 f.write_str(&faults.join("\n"))
             }
+            Self::Study(deck) => write!(
+                f,
+                "this is a study: `bolide study FILE` in a terminal runs it, with --master by this master; a single run has the deck that it names, {deck}"
+            ),
             Self::Start(why) => f.write_str(why),
             Self::Bug => f.write_str("a bug in the master; its log has the words"),
             Self::Ending => f.write_str("the master is ending"),
@@ -149,6 +155,9 @@ async fn in_turn<T: Send + 'static>(
 ) -> Result<T, Error> {
     if name.len() > NAME_LIMIT || name.chars().any(char::is_control) {
         return Err(Error::Name(name.len()));
+    }
+    if let Some(deck) = deck_of_study(&text) {
+        return Err(Error::Study(deck));
     }
     let turn = TURN.acquire().await.map_err(|_| Error::Ending)?;
     let given_up = Arc::new(AtomicBool::new(false));

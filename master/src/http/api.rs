@@ -3,7 +3,7 @@
 //! | request | answer |
 //! |---|---|
 //! | `GET /api/overview` | `{version, join, jobs, hosts, recomputes}`; a job is a status with `brief` once it runs |
-//! | `GET /api/events` | the same as server-sent events, whenever it changes, at most twice a second |
+//! | `GET /api/events` | the same as server-sent events, whenever it changes, at most twice a second; `alive` when 10 s have passed without |
 //! | `POST /api/jobs?name=NAME&cycles=N&min_workers=N&max_workers=N`, body the deck | `{job}`; 422 `{faults: [{file, line, column, ...}]}` |
 //! | `POST /api/check?name=NAME`, body the deck | `{title, parts, elements, nodes, forecast}`, or 422 as above |
 //! | `POST /api/check/surface?name=NAME`, body the deck | the surface before the first cycle, binary |
@@ -22,7 +22,11 @@
 //! path has another method, 409 where the state of the job forbids it, 422 where what was sent
 //! is wrong, 413 where it is too long, 500 after a bug or damage here, 503 where the queue is full or the master ends, and 507 where the disk refused.
 
-use std::{convert::Infallible, path::PathBuf, time::Duration};
+use std::{
+    convert::Infallible,
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 use axum::{
     Json, Router,
@@ -57,6 +61,8 @@ use crate::{
 
 /// The shortest time between two events of the stream.
 const EVENT_EVERY: Duration = Duration::from_millis(500);
+/// The longest time without one: a page that hears nothing tells a master that is stopped from one that has no news.
+const WORD_EVERY: Duration = Duration::from_secs(10);
 /// Most bytes of what the server says when it refuses a request.
 const REFUSAL_LIMIT: usize = 4096;
 /// Most characters of a deck's name.
@@ -166,13 +172,22 @@ async fn events(State(api_state): State<ApiState>) -> impl IntoResponse {
     let (send, receive) = mpsc::channel::<Result<sse::Event, Infallible>>(1);
     tokio::spawn(async move {
         let mut before = serde_json::Value::Null;
+        let mut said = Instant::now();
         while let Ok(now) = all(&api_state).await {
-            if now != before {
-                let event = sse::Event::default().event("overview").data(now.to_string());
+            let event = match now != before {
+                true => Some(sse::Event::default().event("overview").data(now.to_string())),
+                // Comments, which keep a connection open, are not shown to scripts.
+                false if said.elapsed() >= WORD_EVERY => {
+                    Some(sse::Event::default().event("alive").data("true"))
+                }
+                false => None,
+            };
+            before = now;
+            if let Some(event) = event {
+                said = Instant::now();
                 if send.send(Ok(event)).await.is_err() {
                     return;
                 }
-                before = now;
             }
             tokio::select! {
                 () = send.closed() => return,
@@ -216,6 +231,7 @@ impl From<desk::Error> for Fault {
             desk::Error::Options(_)
             | desk::Error::Name(_)
             | desk::Error::Faults(_)
+            | desk::Error::Study(_)
             | desk::Error::Start(_) => StatusCode::UNPROCESSABLE_ENTITY,
             desk::Error::Ending => StatusCode::SERVICE_UNAVAILABLE,
             desk::Error::Bug => StatusCode::INTERNAL_SERVER_ERROR,
@@ -229,7 +245,11 @@ impl From<desk::Error> for Fault {
             column: fault.column,
             read: fault.read,
             expected: fault.expected,
-            advice: fault.advice,
+            // The page has no such flag.
+            advice: match fault.advice.contains("--set ") {
+                true => format!("write its number into the deck, or {} of bolide submit", fault.advice),
+                false => fault.advice,
+            },
         };
         let faults: Vec<Place> = faults.into_iter().map(place).collect();
         Self(status, json!({ "faults": faults }))
