@@ -161,6 +161,23 @@ impl CaFolder {
         (path, used)
     }
 
+    /// Whether a certificate of a master was issued for `name`.
+    ///
+    /// # Errors
+    /// If the disk refuses.
+    pub fn has_master(&self, name: &str) -> Result<bool, Error> {
+        let issued = self.folder.join("issued");
+        let fault = |error| Error::Io { path: issued.clone(), error };
+        for entry in fs::read_dir(&issued).map_err(fault)? {
+            let path = entry.map_err(fault)?.path();
+            let identity = tls::identity_of_file(&path).map_err(|e| Error::Rule(e.to_string()))?;
+            if identity.role == Role::Master && identity.name == name {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     /// Revokes every certificate that was issued for `name`; gives their number.
     ///
     /// # Errors

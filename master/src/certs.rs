@@ -5,6 +5,7 @@
 //! the files are used for is in [`protocol::tls`].
 
 pub mod arguments;
+pub mod fit;
 
 use protocol::tls::{Paths, Role};
 use rcgen::{
@@ -168,10 +169,9 @@ pub(crate) fn make_request() -> Result<(KeyPair, Vec<u8>), Error> {
     Ok((key, request.der().to_vec()))
 }
 
-/// Puts the three files of this host into `folder`, which must not hold any of them.
+/// Puts the three files of this host into `folder`, in place of any that are there.
 pub(crate) fn install(folder: &Path, key: &KeyPair, certificate: &str, ca: &str) -> Result<Paths, Error> {
     let paths = Paths::in_folder(folder);
-    check_absent(&[&paths.ca, &paths.certificate, &paths.key], false)?;
     create_folder(folder)?;
     write(&paths.key, &key.serialize_pem(), Readers::Owner)?;
     write(&paths.ca, ca, Readers::All)?;

@@ -10,10 +10,11 @@ use protocol::{
     token::Token,
 };
 use tokio::{net::TcpListener, sync::mpsc};
-use worker::notify;
+use worker::{ending, notify};
 
 use crate::{
     ca_folder::CaFolder,
+    certs::fit,
     command::MasterArgs,
     connection::{Acceptor, listen},
     http::{self, board::Board},
@@ -39,6 +40,9 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
     let tls = args.certs.as_ref().map(|folder| tls::Paths::in_folder(folder));
     let config = if ca_folder.is_some() { tls::open_server_config } else { tls::server_config };
     let tls = tls.map(|paths| config(&paths)).transpose().map_err(|e| e.to_string())?;
+    if let Some(folder) = &args.certs {
+        fit::check(folder, args.lab.as_deref())?;
+    }
     if tls.is_none() {
         tls::loopback_only(args.listen).map_err(|e| e.to_string())?;
     }
@@ -67,6 +71,9 @@ pub fn run(args: &MasterArgs) -> Result<ExitCode, String> {
         let ca_folder =
             ca_folder.map(|ca_folder| ca_folder.follow().map(|revoked| (ca_folder, revoked))).transpose();
         let ca_folder = ca_folder.map_err(|e| e.to_string())?;
+        if let Some(folder) = &args.certs {
+            ending::watch(tls::Paths::in_folder(folder).certificate);
+        }
         let (notices, heard) = mpsc::channel(WAITING_NOTICES);
         let acceptor = Arc::new(
             Acceptor::new(notices.clone(), vec![Role::Worker, Role::Client], None, tls)

@@ -4,7 +4,7 @@
 //! made by itself and never travels: what it sends is a request to have the key signed. It then dials anew as what the
 //! certificate says.
 
-use std::{io::Read, net::SocketAddr, path::Path};
+use std::{io::Read, net::SocketAddr, path::Path, time::SystemTime};
 
 use protocol::{
     Error, Result, codec,
@@ -73,7 +73,6 @@ async fn receive(receiver: &mut Receiver) -> Result<Frame> {
 /// # Errors
 /// Why not, as a sentence. A folder that has certificates is left alone.
 pub fn join(master: &str, token: &str, name: &str, folder: &Path) -> std::result::Result<(), String> {
-    let token: Token = token.parse().map_err(|e: Error| e.to_string())?;
     let paths = tls::Paths::in_folder(folder);
     for path in [&paths.ca, &paths.certificate, &paths.key] {
         if path.exists() {
@@ -83,6 +82,24 @@ pub fn join(master: &str, token: &str, name: &str, folder: &Path) -> std::result
             ));
         }
     }
+    exchange_into(master, token, name, folder)
+}
+
+/// The same in place of certificates that count no more; they stay until there are others.
+///
+/// # Errors
+/// Why not, as a sentence.
+pub fn join_anew(master: &str, token: &str, name: &str, folder: &Path) -> std::result::Result<(), String> {
+    exchange_into(master, token, name, folder)
+}
+
+/// Whether a certificate is one, and out of date.
+pub fn has_expired(certificate: &Path) -> bool {
+    tls::identity_of_file(certificate).is_ok_and(|identity| identity.fault(None, SystemTime::now()).is_some())
+}
+
+fn exchange_into(master: &str, token: &str, name: &str, folder: &Path) -> std::result::Result<(), String> {
+    let token: Token = token.parse().map_err(|e: Error| e.to_string())?;
     let (key, request) = certs::make_request().map_err(|e| e.to_string())?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|e| format!("threads of the link: {e}"))?;

@@ -19,7 +19,7 @@ use protocol::{
     link::Receiver,
     order::{BULK_ON_THE_WAY, Inbox, Outbox},
     shape::Shape,
-    tls::ClientConfig,
+    tls::{self, ClientConfig},
     wire,
 };
 use rayon::ThreadPool;
@@ -31,6 +31,7 @@ use tokio::{
 use tracing::{info, warn};
 
 use crate::{
+    ending,
     input::Input,
     notify,
     owner::{self, Rules, Share},
@@ -151,6 +152,9 @@ pub fn run(options: &Options) -> std::result::Result<(), String> {
         let share = Share::default();
         let away = owner::watch(&options.rules, &share);
         tokio::spawn(notify::live());
+        if let Some(folder) = &options.certs {
+            ending::watch(tls::Paths::in_folder(folder).certificate);
+        }
         // A master that is away is no fault of this service.
         notify::say(&format!("READY=1\nSTATUS=dialling {}", options.master));
         let process = Process {

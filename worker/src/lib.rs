@@ -10,6 +10,7 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 
 pub mod compute;
 pub mod daemon;
+pub mod ending;
 pub mod input;
 pub mod notify;
 pub mod owner;
