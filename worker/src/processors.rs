@@ -13,7 +13,7 @@ impl Processors {
     /// Confines this process to them: the calling thread, and all that it starts from now on.
     ///
     /// # Errors
-    /// If this machine has none of them.
+    /// If this machine lacks one of them.
     pub fn apply(&self) -> Result<(), String> {
         system::processors::pin(&self.0)
             .map_err(|e| format!("processors {:?}: {e}; `nproc --all` says how many there are", self.0))

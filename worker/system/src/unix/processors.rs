@@ -32,9 +32,19 @@ pub fn low_priority_of_process() {
 /// Confines the calling thread, and all that it starts from now on, to processors of this machine.
 ///
 /// # Errors
-/// If the machine has none of them, or refuses.
+/// If the machine lacks one of them, or refuses.
 pub fn pin(processors: &[usize]) -> io::Result<()> {
-    confine(processors)
+    confine(processors)?;
+    // Those that the machine lacks are left out in silence.
+    let taken = allowed().unwrap_or_default();
+    let missing = |n: &&usize| !taken.is_empty() && !taken.contains(n);
+    match processors.iter().filter(missing).count() {
+        0 => Ok(()),
+        missing => {
+            let why = format!("this process can have {taken:?} of them, and not the {missing} others");
+            Err(io::Error::new(io::ErrorKind::InvalidInput, why))
+        }
+    }
 }
 
 /// Number of cores that this process may use, however many processors each has; none if the machine does not say.

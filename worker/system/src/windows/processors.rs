@@ -32,12 +32,16 @@ pub fn low_priority_of_process() {
 /// Confines this process to processors of this machine; it has 64 to choose from, those of its group.
 ///
 /// # Errors
-/// If the machine has none of them, or refuses.
+/// If the machine lacks one of them, or refuses.
 pub fn pin(processors: &[usize]) -> io::Result<()> {
     let bit = |&n: &usize| u32::try_from(n).ok().and_then(|n| 1_usize.checked_shl(n)).unwrap_or(0);
-    let asked = processors.iter().map(bit).fold(0, |mask, bit| mask | bit);
-    // Processors that the machine lacks are left out, as Linux does it.
-    let mask = asked & masks()?.1;
+    let there = masks()?.1;
+    let missing = processors.iter().filter(|n| bit(n) & there == 0).count();
+    if missing > 0 {
+        let why = format!("this process can have {} of them, and not the others", processors.len() - missing);
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
+    }
+    let mask = processors.iter().map(bit).fold(0, |mask, bit| mask | bit);
     // SAFETY: the handle of this process is always good.
     let done = unsafe { SetProcessAffinityMask(GetCurrentProcess(), mask) };
     if done == 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
