@@ -26,11 +26,14 @@ pub mod table;
 
 use std::{
     fs,
-    io::Write as _,
+    io::{ErrorKind, Write as _},
     path::{Path, PathBuf},
     process::ExitCode,
     sync::{Arc, atomic::Ordering},
 };
+
+use deck::{Fault, fault::Faults};
+use toml::de::DeTable;
 
 use arguments::{On, StudyArgs};
 use batch::{Batch, Engine};
@@ -45,7 +48,7 @@ use table::{Outcome, Outcomes};
 use crate::{
     client::arguments::ClientArgs,
     interrupt::stop_on_interrupt,
-    results::write_whole,
+    results::{Folder, write_whole},
     shell::{self, tell},
 };
 
@@ -74,6 +77,7 @@ fn compute_all(args: &StudyArgs) -> Result<ExitCode, String> {
         return Ok(ExitCode::SUCCESS);
     }
     fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
+    let _lock = Folder::reopen(&out).map_err(|e| e.to_string())?;
     let stop = stop_on_interrupt("stopping; what is under way is stored");
     let mut place = open_place(args, &study, &cache, &out)?;
     course.run(&mut *place, &stop)?;
@@ -125,13 +129,29 @@ fn warn_of_short_runs(study: &Study, outcomes: &Outcomes) {
     }
 }
 
+/// A study whose deck is there.
+fn with_deck(study: Study) -> Result<Study, Vec<Fault>> {
+    let Err(why) = fs::metadata(&study.deck) else { return Ok(study) };
+    let document = DeTable::parse(&study.text).ok();
+    let at = document.and_then(|document| Some(document.get_ref().get("deck")?.span().start));
+    let faults = Faults::new(&study.file, &study.text);
+    let deck = study.deck.display();
+    let absent = match why.kind() {
+        ErrorKind::NotFound => format!("the deck {deck}, which is not there"),
+        _ => format!("the deck {deck}: {why}"),
+    };
+    let expected = "the name of a deck's file, seen from the folder of the study";
+    faults.add(at.unwrap_or(0), absent, expected, "correct the name, or put the deck there");
+    Err(faults.into_list())
+}
+
 /// Reads and checks a study.
 ///
 /// # Errors
 /// Its faults, one per line.
 fn open(path: &Path) -> Result<Study, String> {
     let text = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    read::read(&text, path).map_err(|faults| {
+    read::read(&text, path).and_then(with_deck).map_err(|faults| {
         let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
         let ending = if lines.len() == 1 { "" } else { "s" };
         format!("{} fault{ending} in the study\n{}", lines.len(), lines.join("\n"))
@@ -143,7 +163,7 @@ fn open_cache(args: &StudyArgs, out: &Path) -> Result<Arc<Cache>, String> {
     let own: PathBuf = out.join("runs");
     let (folder, most) = if args.no_cache {
         match fs::remove_dir_all(&own) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(e) if e.kind() != ErrorKind::NotFound => {
                 return Err(format!("{}: {e}", own.display()));
             }
             _ => {}

@@ -54,6 +54,22 @@ pub struct Course<'a> {
     pub tally: Tally,
 }
 
+/// Of a study without a point: how many of the points each of its conditions admits.
+fn excluded(study: &Study) -> String {
+    let sites = study.sites_before_conditions();
+    let admitted = study.conditions.iter().zip(&study.texts_of_conditions).map(|(condition, text)| {
+        let admitted = sites.iter().filter(|site| study.admits_by(condition, site)).count();
+        format!("{text:?} admits {admitted}")
+    });
+    let admitted: Vec<String> = admitted.collect();
+    format!(
+        "{}: the conditions of the study exclude every point: of {} {}; change where, or the values",
+        study.file,
+        sites.len(),
+        admitted.join(", ")
+    )
+}
+
 impl<'a> Course<'a> {
     /// A study of which nothing is known.
     pub fn new(study: &'a Study, cache: Arc<Cache>) -> Self {
@@ -75,7 +91,7 @@ impl<'a> Course<'a> {
     pub fn begin(&mut self) -> Result<(), String> {
         let wanted = self.wanted();
         if wanted.is_empty() {
-            return Err("the conditions of the study exclude every point".to_owned());
+            return Err(excluded(self.study));
         }
         let mut faults: BTreeMap<String, (usize, &Point)> = BTreeMap::new();
         let mut n_faulty = 0;

@@ -194,6 +194,7 @@ mod tests {
             sampling: None,
             listed: Vec::new(),
             conditions: Vec::new(),
+            texts_of_conditions: Vec::new(),
             measures: Vec::new(),
             goal,
             scatter: None,

@@ -31,6 +31,8 @@ pub struct Study {
     pub listed: Vec<Vec<f64>>,
     /// What a point must fulfil to be computed.
     pub conditions: Vec<Formula>,
+    /// Their words.
+    pub texts_of_conditions: Vec<String>,
     pub measures: Vec<Measure>,
     pub goal: Goal,
     pub scatter: Option<Scatter>,
@@ -191,6 +193,13 @@ impl Study {
     }
 
     fn find_sites(&self) -> Vec<Vec<f64>> {
+        let mut sites = self.sites_before_conditions();
+        sites.retain(|site| self.goal.search().is_some() || self.admits(site));
+        sites
+    }
+
+    /// The same, with those that the conditions refuse.
+    pub fn sites_before_conditions(&self) -> Vec<Vec<f64>> {
         let searched = self.goal.search().map(|search| search.parameter);
         let mut sites: Vec<Vec<f64>> = Vec::new();
         if self.has_grid() {
@@ -236,8 +245,12 @@ impl Study {
             point(a).cmp(&point(b))
         });
         sites.dedup_by(|a, b| a.iter().zip(b.iter()).all(|(a, b)| a.to_bits() == b.to_bits()));
-        sites.retain(|site| searched.is_some() || self.admits(site));
         sites
+    }
+
+    /// Whether a point fulfils one condition.
+    pub fn admits_by(&self, condition: &Formula, values: &[f64]) -> bool {
+        condition.of_parameters(&self.named(values)).is_ok_and(|holds| holds != 0.0)
     }
 
     /// Whether a point fulfils the conditions. Their names were checked, so one that has no value holds nowhere.

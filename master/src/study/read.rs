@@ -98,7 +98,8 @@ fn read_document<'a>(document: &'a DeTable<'a>, path: &Path, faults: &'a Faults<
         parameters: parameters.into_iter().map(|(parameter, _)| parameter).collect(),
         sampling,
         listed,
-        conditions,
+        conditions: conditions.0,
+        texts_of_conditions: conditions.1,
         measures,
         goal: goal?,
         scatter,
@@ -164,6 +165,13 @@ fn read_values(table: &Table<'_>) -> Option<Values> {
         let numbers = numbers?;
         if numbers.is_empty() || numbers.len() > MAX_POINTS {
             value.fault(&format!("1 to {MAX_POINTS} numbers"), "change the list");
+            return None;
+        }
+        let mut sorted = numbers.clone();
+        sorted.sort_by(f64::total_cmp);
+        if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            // Each point is computed once, so that the table would have fewer rows than the list has numbers.
+            value.fault("numbers that differ", &format!("remove {} where it stands again", twice[0]));
             return None;
         }
         Some(numbers)
@@ -241,14 +249,15 @@ fn read_formula(value: Value<'_>, names: &[&str]) -> Option<(Formula, String)> {
     }
 }
 
-fn read_conditions(value: Value<'_>, names: &[&str]) -> Vec<Formula> {
-    let Some(items) = value.items() else { return Vec::new() };
+/// Conditions, and their words.
+fn read_conditions(value: Value<'_>, names: &[&str]) -> (Vec<Formula>, Vec<String>) {
+    let Some(items) = value.items() else { return Default::default() };
     if items.len() > MAX_CONDITIONS {
         value.fault(&format!("at most {MAX_CONDITIONS} conditions"), "join some with \" and \"");
-        return Vec::new();
+        return Default::default();
     }
     let condition = |item: Value<'_>| {
-        let (formula, _) = read_formula(item, names)?;
+        let (formula, text) = read_formula(item, names)?;
         if !formula.is_comparison() || !formula.is_of_parameters() {
             item.fault(
                 "a comparison of parameters such as \"thickness < 2 * radius\"",
@@ -256,9 +265,9 @@ fn read_conditions(value: Value<'_>, names: &[&str]) -> Vec<Formula> {
             );
             return None;
         }
-        Some(formula)
+        Some((formula, text))
     };
-    items.into_iter().filter_map(condition).collect()
+    items.into_iter().filter_map(condition).unzip()
 }
 
 /// Reads `[[measure]]`.
@@ -537,6 +546,10 @@ mod tests {
         for (text, words) in [
             ("[[parameter]]\nname = \"a\"\n", "3:1: read parameter a without values"),
             ("[[parameter]]\nname = \"a\"\nfrom = 1\nto = 2\n", "3:1: read parameter a with a range alone"),
+            (
+                "[[parameter]]\nname = \"a\"\nvalues = [100, 2, 100]\n",
+                "5:10: read values = [100, 2, 100]; expected numbers that differ; remove 100",
+            ),
             ("[[parameter]]\nname = \"a\"\nfrom = 1\n", "5:8: read from = 1; expected both from and to"),
             (
                 "[[parameter]]\nname = \"a\"\nvalues = [1]\nto = 2\n",
