@@ -28,7 +28,7 @@ use crate::{
     machine::host_name,
     output::span,
     results::{Folder, SUMMARY, Summary, Units, create_anew, summary::significant, temporary_of},
-    shell::{print, quoted, tell},
+    shell::{obeys, print, quoted, tell},
 };
 
 pub mod arguments;
@@ -222,7 +222,12 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 
 impl Line {
     fn new() -> Self {
-        Self { stays: std::io::stderr().is_terminal(), last: String::new(), state: None, at: Instant::now() }
+        Self {
+            stays: std::io::stderr().is_terminal() && obeys(),
+            last: String::new(),
+            state: None,
+            at: Instant::now(),
+        }
     }
 
     fn show(&mut self, line: &str, state: State) {

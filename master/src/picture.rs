@@ -9,7 +9,7 @@
 
 use std::{
     fs::File,
-    io::BufWriter,
+    io::{BufWriter, Write},
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -29,6 +29,7 @@ use crate::{
             field_data::PART_NAMES,
             read::{self, Piece},
         },
+        write_whole,
     },
     shell::print,
 };
@@ -56,6 +57,15 @@ const FIELD_OF_A_DECK: &str = "part";
 /// # Errors
 /// Files that cannot be read or written, and fields that they do not hold, with those they do.
 pub fn run(args: &PictureArgs) -> Result<ExitCode, String> {
+    let ending = args.out.extension().and_then(|ending| ending.to_str());
+    if let Some(ending) = ending.filter(|ending| args.movie.is_none() && !ending.eq_ignore_ascii_case("png"))
+    {
+        return Err(format!(
+            "--out {}: a picture is a PNG, not .{ending}; name it {}",
+            args.out.display(),
+            args.out.with_extension("png").display()
+        ));
+    }
     if is_deck(&args.results) {
         return of_deck(args);
     }
@@ -267,7 +277,7 @@ fn folder(results: &Path) -> &Path {
 }
 
 /// The units of a run, by the headings of its history; dimensions where there is none.
-fn units_of(results: &Path) -> Units {
+pub fn units_of(results: &Path) -> Units {
     let columns = Table::read_columns(&folder(results).join(HISTORY), &[]).map(|(columns, _)| columns);
     let columns = columns.unwrap_or_default();
     let fits = |units: &Units| {
@@ -339,13 +349,23 @@ pub fn of_report(folder: &Path, summary: &Summary) -> Vec<Picture> {
     ends.into_par_iter().filter_map(draw).collect()
 }
 
-/// Writes a PNG file.
+/// Writes a PNG file, whole or not at all.
 fn write(path: &Path, image: &Image) -> Result<(), String> {
-    encode(create(path)?, image).map_err(|e| format!("{}: {e}", path.display()))
+    let fault = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
+    let mut png = Vec::new();
+    encode(&mut png, image).map_err(|e| fault(&e))?;
+    // What is there and no file, such as /dev/stdout, keeps its place.
+    if path.file_name().is_none() || std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+        return std::fs::write(path, png).map_err(|e| fault(&e));
+    }
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).map_err(|e| fault(&e))?;
+    }
+    write_whole(path, |out| out.write_all(&png)).map_err(|e| e.to_string())
 }
 
 /// An image as PNG into any writer.
-fn encode(out: impl std::io::Write, image: &Image) -> Result<(), png::EncodingError> {
+fn encode(out: impl Write, image: &Image) -> Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(out, image.width, image.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);

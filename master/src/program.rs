@@ -23,7 +23,7 @@ use crate::{
     check, client,
     command::{Bench, Cli, Command, WorkerArgs},
     convert, daemon, export, init, machine, materials, newcomer, picture, processes, report, run,
-    shell::{print, tell},
+    shell::{may_colour, print, quoted, tell},
     simulate, study, verify,
 };
 
@@ -38,7 +38,7 @@ pub fn log<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
     });
     tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(std::io::stderr().is_terminal() && may_colour())
         .with_target(false)
         // That a line cannot be written cannot be told there either.
         .log_internal_errors(false)
@@ -134,11 +134,16 @@ fn join_first(command: &Command) -> Result<(), String> {
 
 fn join(args: &WorkerArgs) -> Result<(), String> {
     let token = args.join.clone().or_else(|| std::env::var(newcomer::TOKEN).ok());
-    if let (Some(token), Some(folder)) = (&token, &args.certs)
-        && !tls::Paths::in_folder(folder).certificate.exists()
-    {
+    if let (Some(token), Some(folder)) = (&token, &args.certs) {
         let name = args.name.clone().unwrap_or_else(machine::host_name);
-        newcomer::join(&args.master, &newcomer::token(token)?, handshake::host_of(&name), folder)?;
+        let (token, host) = (newcomer::token(token)?, handshake::host_of(&name));
+        let certificate = tls::Paths::in_folder(folder).certificate;
+        if !certificate.exists() {
+            newcomer::join(&args.master, &token, host, folder)?;
+        } else if newcomer::has_expired(&certificate) {
+            tracing::info!("{} has expired; asking for another", certificate.display());
+            newcomer::join_anew(&args.master, &token, host, folder)?;
+        }
     }
     Ok(())
 }
@@ -226,11 +231,19 @@ fn make_certificates(what: Certs) -> Result<ExitCode, String> {
             print(&format!("made {}", tls::Paths::in_folder(&folder).certificate.display()))?;
         }
         Certs::Revoke { folder, name } => {
-            let revoked =
-                CaFolder::open(&folder).and_then(|ca| ca.revoke(&name)).map_err(|e| e.to_string())?;
-            print(&format!(
-                "revoked {revoked} of {name}; a running master with --lab ends its links within seconds"
-            ))?;
+            let ca_folder = CaFolder::open(&folder).map_err(|e| e.to_string())?;
+            let revoked = ca_folder.revoke(&name).map_err(|e| e.to_string())?;
+            if ca_folder.has_master(&name).map_err(|e| e.to_string())? {
+                let lab = quoted(&folder.display().to_string());
+                print(&format!(
+                    "revoked {revoked} of {name}, but only a master looks at the list, for who calls it: workers and clients go on taking {name} for \
+                     their master. If its key is in other hands, make a new CA with `bolide certs ca {lab} --force` and new certificates for all hosts"
+                ))?;
+            } else {
+                print(&format!(
+                    "revoked {revoked} of {name}; a running master with --lab ends its links within seconds"
+                ))?;
+            }
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -11,7 +11,7 @@ use deck::{bundle::Options, model::Model};
 use crate::{
     command::RunArgs,
     deck_file::{gather_deck, read_gathered},
-    results::{HISTORY, Summary, Units, history::Table, summary::significant},
+    results::{HISTORY, Summary, Units, history, history::Table, summary::significant},
     run::{folder_for, run_with},
     shell::{print, tell},
     study::measure::{Facts, Formula, OF_SUMMARY, of_summary},
@@ -50,6 +50,10 @@ pub fn run(args: &RunArgs, factor: u32) -> Result<ExitCode, String> {
     // What is wrong with the finer deck, or with a formula, is told before the first run and not after it.
     let model = read_gathered(&gather_deck(&args.deck, &finer)?, &shown)?;
     let formulas = formulas(&args.measure)?;
+    let facts = Facts::of(&model, &history::columns(&model));
+    for (text, formula) in &formulas {
+        formula.check(&facts).map_err(|why| format!("--measure {text:?}: {why}"))?;
+    }
     tell(&format!(
         "{} elements with cells {factor} times finer; that run takes some {} times as long as the first",
         model.mesh.n_elements(),

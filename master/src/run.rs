@@ -25,7 +25,11 @@ use crate::{
     output::Output,
     processes::Processes,
     refine,
-    results::{self, Folder, Summary, summary::Origin, trace},
+    results::{
+        self, Folder, Summary,
+        summary::{Origin, significant},
+        trace,
+    },
     shell::{print, quoted, tell},
     snapshot::{
         self, Snapshot,
@@ -227,7 +231,16 @@ fn resumed_from(path: &Path, own: Option<&Path>) -> Result<Option<Snapshot>, Str
             info!("going on at cycle 0");
             Ok(None)
         }
-        None => Err(format!("no whole snapshot in {}; start the run anew, with --force", folder.display())),
+        // A run that is complete has removed what it stored for itself alone.
+        None => match Summary::read(path) {
+            Ok(Summary { cycles, end_time, digest, .. }) if !digest.is_empty() => Err(format!(
+                "{}: that run is over, after {cycles} cycles at time {} with digest {digest}, and there is nothing to resume; to compute it once more \
+                 give --out another folder, since --force replaces its results",
+                path.display(),
+                significant(end_time)
+            )),
+            _ => Err(format!("no whole snapshot in {}; start the run anew, with --force", folder.display())),
+        },
     }
 }
 

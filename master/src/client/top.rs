@@ -1,6 +1,6 @@
 //! TOP: `bolide top`, hosts and jobs of a master in a terminal, looked at once a second.
 //!
-//! Without a terminal it prints one table and ends; with `--json` one line of JSON.
+//! Without a terminal, or in one without escape sequences (`TERM=dumb`), it prints one table and ends; with `--json` one line of JSON.
 
 use std::{
     collections::BTreeMap,
@@ -17,7 +17,7 @@ use super::{
     screen::{Key, Screen, Tint},
     surprise,
 };
-use crate::shell::print;
+use crate::shell::{obeys, print};
 
 /// Between two looks.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
@@ -42,7 +42,7 @@ pub fn run(at: &ClientArgs) -> Result<ExitCode, String> {
         print(&value.to_string())?;
         return Ok(ExitCode::SUCCESS);
     }
-    if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
+    if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() || !obeys() {
         print(&plain(&seen))?;
         return Ok(ExitCode::SUCCESS);
     }

@@ -30,7 +30,7 @@ pub struct PictureArgs {
     #[arg(long, value_name = "N", conflicts_with = "time")]
     pub state: Option<usize>,
     /// Time of the state, in the deck's unit; the nearest is taken
-    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = finite)]
     pub time: Option<f64>,
     /// From where: x, y, z, -x, -y, -z, iso, or AZIMUTH,ELEVATION in degrees [default: iso, turned to a cut]
     #[arg(long, allow_hyphen_values = true)]
@@ -53,6 +53,11 @@ pub struct PictureArgs {
     /// Leave out the edges of elements
     #[arg(long)]
     pub no_edges: bool,
+}
+
+/// A time that a state may have.
+fn finite(text: &str) -> Result<f64, String> {
+    text.trim().parse().ok().filter(|time: &f64| time.is_finite()).ok_or_else(|| "a finite number".to_owned())
 }
 
 /// Two ends of a colour bar, as `LOW,HIGH`.
