@@ -272,7 +272,9 @@ class Result:
         if index is not None and time is not None:
             raise BolideError(f"state {index} and the time {time}: give one of both")
         if time is not None and not math.isfinite(time):
-            raise BolideError(f"the time of a state is {time}, which is no finite number; there are {states[0][0]:g} to {states[-1][0]:g}")
+            raise BolideError(
+                f"the time of a state is {time}, which is no finite number; there are {states[0][0]:g} to {states[-1][0]:g}"
+            )
         if time is not None:
             found = min(states, key=lambda state: abs(state[0] - time))
         else:
