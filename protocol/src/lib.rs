@@ -185,8 +185,7 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            // The first bytes of an alert or of a greeting of TLS.
-            Self::Magic { found: [0x15 | 0x16, 3, ..] } => f.write_str(
+            Self::Magic { found: [first, second, ..] } if tls::begins([*first, *second]) => f.write_str(
                 "the peer speaks TLS, and this side has no certificates: give --certs FOLDER, as `bolide certs host` makes it",
             ),
             Self::Magic { found } => write!(

@@ -470,6 +470,11 @@ fn check_private(path: &Path) -> Result<()> {
     }
 }
 
+/// Whether these are the first bytes of an alert or a greeting of TLS.
+pub const fn begins(bytes: [u8; 2]) -> bool {
+    matches!(bytes, [0x15 | 0x16, 3])
+}
+
 /// The words for a failed read, write or handshake: a fault of certificates on one line with what to do,
 /// anything else as the system says it.
 pub fn explain(error: &std::io::Error) -> String {

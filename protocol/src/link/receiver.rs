@@ -2,6 +2,7 @@
 
 use super::{Counters, EAGER, FIRST_ALLOCATION, READ_AT_ONCE, READ_BUFFER, Shared};
 use crate::frame::{Checksum, Frame, HEADER_LEN, Header, Kind, decode_header};
+use crate::tls;
 use crate::{Error, Result};
 use std::pin::Pin;
 use std::sync::Arc;
@@ -265,8 +266,13 @@ impl Receiver {
     async fn header(&mut self) -> Result<Header> {
         while self.incoming.head_bytes < HEADER_LEN {
             if self.read_some().await? == 0 {
+                let head = &self.incoming.head;
                 return Err(match self.incoming.head_bytes {
                     0 => Error::Closed,
+                    // An alert of TLS is shorter than a header.
+                    7.. if tls::begins([head[0], head[1]]) => {
+                        Error::Magic { found: [head[0], head[1], head[2], head[3]] }
+                    }
                     found => Error::Truncated {
                         what: "frame header",
                         found: found as u64,

@@ -419,7 +419,18 @@ async fn a_peer_that_hangs_up_on_tls_may_run_without_certificates() {
         let mut said = [0; 16];
         tokio::io::AsyncReadExt::read_exact(&mut far, &mut said).await.expect("a greeting");
     };
-    let (told, ()) = tokio::join!(tls::connect(near, "127.0.0.1", &client, tls::Role::Master), hang_up);
+    let (told, ()) = tokio::join!(tls::connect(near, "127.0.0.1", &client, Role::Master), hang_up);
     let text = told.expect_err("nobody there").to_string();
     assert!(text.ends_with("in the middle; it may run without certificates"), "{text}");
+}
+
+#[tokio::test]
+async fn a_caller_without_certificates_hears_that_the_peer_speaks_tls() {
+    let (near, mut far) = tokio::io::duplex(4096);
+    let (_sender, mut receiver) = split(near, Settings::default());
+    // The alert of a server that read no greeting of TLS.
+    tokio::io::AsyncWriteExt::write_all(&mut far, &[0x15, 3, 3, 0, 2, 2, 10]).await.expect("room");
+    drop(far);
+    let text = receiver.receive().await.expect_err("no frame").to_string();
+    assert!(text.contains("speaks TLS") && text.contains("--certs FOLDER"), "{text}");
 }
