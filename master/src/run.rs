@@ -233,12 +233,16 @@ fn resumed_from(path: &Path, own: Option<&Path>) -> Result<Option<Snapshot>, Str
         }
         // A run that is complete has removed what it stored for itself alone.
         None => match Summary::read(path) {
-            Ok(Summary { cycles, end_time, digest, .. }) if !digest.is_empty() => Err(format!(
-                "{}: that run is over, after {cycles} cycles at time {} with digest {digest}, and there is nothing to resume; to compute it once more \
+            Ok(Summary { cycles, end_time, digest, .. })
+                if found.warnings.is_empty() && !digest.is_empty() =>
+            {
+                Err(format!(
+                    "{}: that run is over, after {cycles} cycles at time {} with digest {digest}, and there is nothing to resume; to compute it once more \
                  give --out another folder, since --force replaces its results",
-                path.display(),
-                significant(end_time)
-            )),
+                    path.display(),
+                    significant(end_time)
+                ))
+            }
             _ => Err(format!("no whole snapshot in {}; start the run anew, with --force", folder.display())),
         },
     }
