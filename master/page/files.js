@@ -38,6 +38,8 @@ function included(text) {
 export function deckOf(files) {
   const name = file => file.path.split('/').at(-1);
   let decks = files.filter(file => /\.toml$/i.test(file.path));
+  // A study of the deck may lie beside it.
+  if (decks.length > 1) decks = decks.filter(file => !/\.study\.toml$/i.test(file.path));
   if (!decks.length) {
     const keywords = files.filter(file => /^\s*[*$]/.test(file.text));
     decks = keywords.filter(file => !keywords.some(other => other !== file && included(other.text).includes(name(file))));
