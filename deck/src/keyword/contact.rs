@@ -56,6 +56,8 @@ pub(super) struct ContactCard {
     pub(super) decay: Option<(f64, f64)>,
     /// Whether it follows the surface that erosion leaves.
     pub(super) erodes: bool,
+    /// Whether it looks for edges that meet edges.
+    pub(super) edges: bool,
     /// Where nodes of the first are tied to faces of the second.
     pub(super) tied: Option<Tied>,
 }
@@ -85,10 +87,11 @@ impl ContactCard {
             return None;
         }
         let mut extra = usize::from(block.take("_ID") || block.take("_TITLE"));
-        extra += usize::from(block.take("_MPP"));
+        let is_mpp = block.take("_MPP");
+        extra += usize::from(is_mpp);
         extra += usize::from(extra == 0 && (block.take("_ID") || block.take("_TITLE")));
-        // The second card of _MPP is there where it begins so.
-        extra += usize::from(extra > 0 && block.card(extra).text.starts_with('&'));
+        // The second card of _MPP is there where it begins with a sign that is no parameter.
+        extra += usize::from(is_mpp && begins_second_mpp(&block.card(extra).text));
         if block.take("_MORTAR") {
             log.warn(block.at, format!("*{}: our own penalty, on nodes and faces", log.quote(&whole)));
         }
@@ -139,11 +142,21 @@ impl ContactCard {
         }
         all_along(&g, 6, 7);
         let side = |i: usize| Side::read(&f, i, single);
+        // The first optional card, behind that of the kind. With SOFT 2 a DEPTH that ends in 5 looks for edges, too.
+        let kind_card = word.starts_with("ERODING") || word.contains("TIEBREAK");
+        let optional = context.fields(block.card(extra + 3 + usize::from(kind_card)), block.width, &TENS);
+        let by_depth = optional.integer(0) == 2 && optional.integer(5).rem_euclid(10) == 5;
+        let edges = word == "AUTOMATIC_GENERAL" || by_depth;
         // FSF scales friction.
         let factor = match h.within(6, 1.0, Range::NotNegative) {
             0.0 => 1.0,
             factor => factor,
         };
+        if g.real(0, 0.0) == 2.0 {
+            let expected = "a coefficient of friction other than 2: with FS 2 the field FD is the number of a *DEFINE_TABLE";
+            g.fault(0, expected, "give FS, FD and DC; a coefficient that is meant so may be 2.001");
+            return None;
+        }
         let (fixed, moving, decay) = (factor * g.real(0, 0.0), factor * g.real(1, 0.0), g.real(2, 0.0));
         if fixed < 0.0 || (decay != 0.0 && moving < 0.0) {
             g.fault(
@@ -165,7 +178,7 @@ impl ContactCard {
         } else {
             word.starts_with("TIED").then(Tied::default)
         };
-        Some(Self { at: f.at, first: side(0)?, second, friction: fixed, decay, erodes, tied })
+        Some(Self { at: f.at, first: side(0)?, second, friction: fixed, decay, erodes, edges, tied })
     }
 
     /// Reads `*CONTACT_FORCE_TRANSDUCER_`; none where its surfaces are of a kind that is not known.
@@ -184,8 +197,22 @@ impl ContactCard {
         }
         let second = if f.id(1) == 0 { None } else { Some(Side::read(&f, 1, false)?) };
         let first = Side::read(&f, 0, true)?;
-        Some(Self { at: f.at, first, second, friction: 0.0, decay: None, erodes: false, tied: None })
+        Some(Self {
+            at: f.at,
+            first,
+            second,
+            friction: 0.0,
+            decay: None,
+            erodes: false,
+            edges: false,
+            tied: None,
+        })
     }
+}
+
+/// Whether a card is the second of `_MPP`.
+fn begins_second_mpp(card: &str) -> bool {
+    card.strip_prefix('&').is_some_and(|rest| rest.is_empty() || rest.starts_with([' ', ',']))
 }
 
 impl Tied {

@@ -21,16 +21,28 @@ pub(super) fn write(t: &mut Translation<'_>) {
     let mut ties = Vec::new();
     for contact in &problem.contacts {
         if let Some(tied) = contact.tied {
-            ties.extend(tie_of(contact, tied, t));
+            let tie = tie_of(contact, tied, t);
+            if tie.is_none() {
+                t.log.warn(
+                    contact.at,
+                    "a tied contact without parts with elements on both sides: it ties nothing",
+                );
+            }
+            ties.extend(tie);
             if !tied.then_meets {
                 continue;
             }
         }
+        let mut meets = false;
         for (a, b) in pairs_of(contact, t) {
             let known = t.names.contains_key(&a) && t.names.contains_key(&b);
             if known && !t.bodies.same(a, b) {
                 pairs.entry((a, b)).or_insert(contact);
+                meets = true;
             }
+        }
+        if !meets && contact.tied.is_none() {
+            t.log.warn(contact.at, "a contact of no parts with elements that may meet: it does nothing");
         }
     }
     let Some(at) =
@@ -64,7 +76,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
         slack: Slack::Default,
         stiffness: None,
         friction_velocity: None,
-        edges: false,
+        edges: problem.contacts.iter().any(|contact| contact.edges),
         ignores_initial: false,
     });
 }

@@ -107,3 +107,35 @@ fn friction_falls_from_fs_to_fd_by_dc() {
         (0.3, 0.3, 0.0)
     );
 }
+
+#[test]
+fn a_first_card_that_begins_with_a_parameter_is_no_second_card_of_mpp() {
+    let parameters = "*PARAMETER\nIlower,1\nIupper,2\n";
+    let plain = good(1.0, "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE\n1,2,3,3\n0.3\n\n");
+    for contact in [
+        "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n1,pair\n&lower,&upper,3,3\n0.3\n\n",
+        "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_MPP\n0,200\n&lower,&upper,3,3\n0.3\n\n",
+        "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_MPP\n0,200\n&,0,1\n&lower,&upper,3,3\n0.3\n\n",
+        "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_MPP_ID\n1,pair\n0,200\n&        0         1\n&lower,2,3,3\n0.3\n\n",
+    ] {
+        assert_eq!(good(1.0, &format!("{parameters}{contact}")).setup, plain.setup, "{contact}");
+    }
+}
+
+#[test]
+fn general_contact_and_one_of_soft_2_that_looks_for_edges_have_edges() {
+    let edges = |contact: &str| good(1.0, contact).setup.contact.is_some_and(|settings| settings.edges);
+    assert!(edges("*CONTACT_AUTOMATIC_GENERAL\n0\n\n\n"));
+    assert!(edges("*CONTACT_AUTOMATIC_SINGLE_SURFACE\n0\n\n\n2,0.1,0,0,0,5\n"));
+    assert!(edges("*CONTACT_ERODING_SINGLE_SURFACE\n0\n\n\n0,1\n2,0.1,0,0,0,35\n"));
+    assert!(!edges("*CONTACT_ERODING_SINGLE_SURFACE\n0\n\n\n2,1,0,0,0,5\n"));
+    assert!(!edges("*CONTACT_AUTOMATIC_SINGLE_SURFACE\n0\n\n\n1,0.1,0,0,0,5\n"));
+    assert!(!edges("*CONTACT_AUTOMATIC_SINGLE_SURFACE\n0\n\n\n2,0.1,0,0,0,13\n"));
+}
+
+#[test]
+fn friction_by_a_table_is_refused() {
+    let text = deck_of(1.0, "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE\n2,1,3,3\n2.0,7\n\n");
+    let faults = deck::read(&text, "a.k").expect_err("a table");
+    assert!(faults[0].to_string().contains("with FS 2 the field FD is the number"), "{faults:?}");
+}
