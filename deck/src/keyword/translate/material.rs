@@ -9,6 +9,7 @@ use mechanics::material::{
 
 use super::state::Translation;
 use crate::{
+    fault::short,
     keyword::{
         explosive::Jwl,
         material::{EosCard, Law, MaterialCard},
@@ -71,7 +72,18 @@ fn make(t: &Translation<'_>, card: &MaterialCard, part: &PartCard, name: String)
         }
         return None;
     }
-    let eos = eos_of(t, card, eos, part);
+    // LS-DYNA's own laws with moduli make their pressure of them, whatever EOSID says.
+    let makes_pressure = card.elastic.is_some() && !matches!(eos, Some(EosCard::Jwl(_)));
+    if eos.is_some() && makes_pressure {
+        log.warn(
+            part.eos.origin.at,
+            format!(
+                "EOSID {}: material {} makes its pressure of E and PR, so the *EOS is left out, as in LS-DYNA",
+                part.eos.value, part.material.value
+            ),
+        );
+    }
+    let eos = eos_of(t, card, eos.filter(|_| !makes_pressure), part);
     let failure = match &card.law {
         Law::Null { cut_off } if cut_off.value < 0.0 => {
             Failure::Hydrostatic { tension: -cut_off.value, heals: true }
@@ -335,7 +347,12 @@ fn held(t: &Translation<'_>, mut points: Vec<[f64; 2]>, at: Place) -> Hardening 
 /// Points of a yield curve, or of one that may begin without stress, as our law takes them: from strain 0, not descending, few; beyond the last the last slope
 /// goes on, as LS-DYNA continues curves.
 fn hardening(mut points: Vec<[f64; 2]>, from_zero: bool, at: Place, log: &Log<'_>) -> Option<Vec<[f64; 2]>> {
+    let given = points.len();
     points.retain(|p| p[0] >= 0.0);
+    if points.len() < given {
+        let n = given - points.len();
+        log.warn(at, format!("{n} points of a curve by strain lie below strain 0: they are left out"));
+    }
     let bad = points.windows(2).find(|w| w[1][0] <= w[0][0] || w[1][1] < w[0][1]);
     let stress = if from_zero { points.last() } else { points.first() }.map_or(0.0, |p| p[1]);
     if stress <= 0.0 || points[0][1] < 0.0 || bad.is_some() {
@@ -344,6 +361,23 @@ fn hardening(mut points: Vec<[f64; 2]>, from_zero: bool, at: Place, log: &Log<'_
         });
         log.fault(at, read, "strains that ascend, stresses that do not descend", "flatten what softens");
         return None;
+    }
+    if let ([first, second, ..], false) = (&points[..], from_zero)
+        && first[0] > 0.0
+    {
+        // The first line goes back to strain 0, as LS-DYNA continues curves.
+        let stress = (second[1] - first[1]) / (second[0] - first[0]) * -first[0] + first[1];
+        match stress > 0.0 {
+            true => points.insert(0, [0.0, stress]),
+            false => log.warn(
+                at,
+                format!(
+                    "a yield curve that begins at strain {} and comes to no stress at 0: the first stress, {}, is that of 0",
+                    short(first[0]),
+                    short(first[1])
+                ),
+            ),
+        }
     }
     points[0][0] = 0.0;
     if let [.., a, b] = points[..] {
@@ -394,6 +428,13 @@ mod tests {
         assert_eq!(few.len(), MAX_HARDENING);
         assert_eq!(few[0], [0.0, 1.0]);
         assert!(hardening(vec![[0.0, 1.0], [1.0, 0.5]], false, at, &log).is_none());
+        // From strain 0 by the first slope, where a stress is left there.
+        let later = hardening(vec![[0.1, 1.0], [0.3, 1.4], [0.4, 1.4]], false, at, &log);
+        assert_eq!(later, Some(vec![[0.0, 0.8], [0.1, 1.0], [0.3, 1.4], [0.4, 1.4]]));
+        assert_eq!(
+            hardening(vec![[0.1, 0.1], [0.2, 1.0], [0.4, 1.0]], false, at, &log),
+            Some(vec![[0.0, 0.1], [0.2, 1.0], [0.4, 1.0]])
+        );
         assert!(hardening(vec![], false, at, &log).is_none());
         assert!(hardening(vec![[0.0, 0.0], [1.0, 0.5]], false, at, &log).is_none());
         assert!(hardening(vec![[0.0, 0.0], [1.0, 0.5]], true, at, &log).is_some());
