@@ -169,6 +169,24 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> (Placed<u32>, Li
         let value = f[card].real(i, 0.0);
         (value != 0.0 && value != excluded && value.abs() < NEVER).then_some(value)
     };
+    if excluded != 0.0 {
+        // As LS-DYNA has it, 0 excludes nothing then.
+        let zero = |field: &&LimitField| f[field.at[0]].real(field.at[1], 0.0) == 0.0;
+        let names: Vec<&str> = FIELDS.iter().filter(zero).map(|field| field.name).collect();
+        if f[1].real(0, 0.0) == 0.0 && !f[1].blank(0) {
+            f[1].fault(
+                0,
+                format!("MNPRES below 0, or EXCL {excluded}: with EXCL a limit of 0 lets elements leave in any tension"),
+                "give a small tension as a negative pressure, or the exclusion number",
+            );
+        } else if !names.is_empty() {
+            let words = format!(
+                "{}: with EXCL {excluded} a field of 0 is a limit in LS-DYNA; here it is none",
+                names.join(", ")
+            );
+            context.log.warn(f[0].at, words);
+        }
+    }
     for LimitField { at: [card, i], name, above, below } in FIELDS {
         let Some(value) = given(card, i) else { continue };
         let (criterion, sign) = if value > 0.0 { (above, "above") } else { (below, "below") };

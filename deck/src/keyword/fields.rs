@@ -84,6 +84,11 @@ impl<'c> Fields<'c> {
         if i < self.n { self.cells[i].1 } else { "" }
     }
 
+    /// How many fields behind the first eight have words: of cards that have no more.
+    pub(super) fn beyond_eight(&self) -> usize {
+        (8..self.n).filter(|i| !self.cells[*i].1.is_empty()).count()
+    }
+
     /// Whether a field is empty.
     pub(super) fn blank(&self, i: usize) -> bool {
         self.words(i).is_empty()

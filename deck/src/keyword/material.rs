@@ -18,6 +18,7 @@ use super::{
     fields::{Context, Fields, TENS},
 };
 use crate::{
+    fault::short,
     log::Log,
     place::{Origin, Place, Placed},
     table::Range,
@@ -434,6 +435,9 @@ fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool, log: &Log<'_>) -> 
         f[3].fault(3, expected, "leave it blank, or fit D1");
     }
     let cut_off = f[2].real(1, 0.0);
+    if cut_off > 0.0 {
+        log.warn(f[2].at, format!("PC {}: no cut-off, which is a pressure below 0", short(cut_off)));
+    }
     if cut_off < 0.0 && cut_off > -1e15 {
         f[2].fault(1, "no pressure cut-off", "leave PC blank");
     }

@@ -63,6 +63,12 @@ impl Sets {
         let mut entries = Vec::new();
         for card in block.cards.iter().skip(1) {
             let f = context.fields(card, block.width, &TENS);
+            if f.beyond_eight() > 0
+                && kind != "SEGMENT"
+                && !matches!(way, "COLUMN" | "LIST_GENERATE_INCREMENT")
+            {
+                f.fault(8, "at most eight numbers on a card of a set", "put the others on further cards");
+            }
             match (kind, way) {
                 ("SEGMENT", "") => {
                     let mut face = [0, 1, 2, 3].map(|i| f.id(i));

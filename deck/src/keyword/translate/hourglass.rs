@@ -1,6 +1,9 @@
 //! `*HOURGLASS` and `*CONTROL_HOURGLASS`: IHQ becomes a kind of hourglass control, QM its coefficient.
 
-use mechanics::element::hourglass::{Hourglass, Kind};
+use mechanics::element::{
+    hourglass::{Hourglass, Kind},
+    shell4::InPlane,
+};
 
 use super::{control::VISCOSITY, state::Translation};
 use crate::{
@@ -14,12 +17,26 @@ const USUAL: f64 = 0.1;
 /// Hourglass control of the parts that have none of their own: that of LS-DYNA, viscous, where the deck says nothing.
 pub(super) fn of_deck(t: &Translation<'_>) -> Hourglass {
     let given = t.problem.control.hourglass;
+    let parts = &t.problem.parts;
+    if let Some((at, kind, coefficient)) = given
+        && (kind > 3 || ![0.0, USUAL].contains(&coefficient))
+        && t.names.keys().any(|part| parts[part].hourglass == 0 && is_of_thin_shells(t, *part))
+    {
+        t.log.warn(at, "shells have a hourglass control of their own, whatever IHQ and QH");
+    }
     given.map_or(Hourglass::viscous(USUAL), |(at, kind, coefficient)| control(t, at, kind, coefficient))
 }
 
 /// Hourglass control of a part of solids that names one. Shells have their own.
 pub(super) fn of_part(t: &Translation<'_>, part: u32) -> Option<Placed<Hourglass>> {
     let card = &t.problem.parts[&part];
+    if card.hourglass != 0 && is_of_thin_shells(t, part) {
+        let words = format!(
+            "HGID {}: shells have a hourglass control of their own, whatever IHQ and QM",
+            card.hourglass
+        );
+        t.log.warn(card.at, words);
+    }
     let of_solids = matches!(t.problem.sections.get(&card.section.value), Some((_, Section::Solid { .. })));
     if card.hourglass == 0 || !of_solids {
         return None;
@@ -47,6 +64,12 @@ pub(super) fn of_part(t: &Translation<'_>, part: u32) -> Option<Placed<Hourglass
         t.log.warn(given.at, words);
     }
     Some(Placed::new(control, Origin::card(given.at)))
+}
+
+/// Whether a part is of shells with one point in the plane, which alone need control.
+fn is_of_thin_shells(t: &Translation<'_>, part: u32) -> bool {
+    let section = t.problem.sections.get(&t.problem.parts[&part].section.value);
+    matches!(section, Some((_, Section::Shell(shell))) if shell.in_plane == InPlane::One)
 }
 
 fn control(t: &Translation<'_>, at: Place, ihq: i64, coefficient: f64) -> Hourglass {
