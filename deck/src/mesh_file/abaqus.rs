@@ -374,8 +374,8 @@ fn form_of(kind: &str) -> Option<Result<Form, ()>> {
             _ => Err(()),
         });
     }
-    // Gmsh writes surfaces as plane elements.
-    let of_surface = ["STRI", "CPS", "CPE", "CAX", "S"].into_iter().find_map(digits);
+    // Gmsh writes surfaces as elements of plane stress. Those of plane strain and about an axis are no shells.
+    let of_surface = ["STRI", "CPS", "S"].into_iter().find_map(digits);
     if let Some(nodes) = of_surface {
         return Some(match nodes {
             4 => Ok(Form::Quadrilateral),

@@ -323,6 +323,18 @@ fn what_is_left_out_and_what_is_computed_otherwise_is_a_warning() {
         warnings(FILES[3].0, KEYWORD, FILES[3].2),
         with(&["body.k:20: left out, as only the mesh is taken over: *SECTION_SOLID (line 20)"])
     );
+    // Elements of plane strain and about an axis are no shells.
+    for kind in ["CAX4", "CPE4R"] {
+        let flat = ABAQUS.replace(
+            "*Element, type=C3D4,",
+            &format!("*Element, type={kind}, elset=flat\n9, 1, 2, 3, 4\n*Element, type=C3D4,"),
+        );
+        let found = warnings(FILES[1].0, &flat, FILES[1].2);
+        assert!(
+            found[0].contains(&format!("elements of type {kind}")) && found[0].contains("left out"),
+            "{found:?}"
+        );
+    }
     let springs = ABAQUS.replace(
         "*Element, type=C3D4,",
         "*Element, type=SPRINGA, elset=springs\n9, 1, 2\n*Element, type=C3D4,",
