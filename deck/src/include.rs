@@ -10,6 +10,11 @@ pub(crate) fn lines(text: &str) -> impl Iterator<Item = (u32, &str)> {
         .take_while(|(_, line)| !is_end(line))
 }
 
+/// Whether a text has an `*END`.
+pub(crate) fn has_end(text: &str) -> bool {
+    text.lines().any(|line| line.starts_with('*') && is_end(line))
+}
+
 fn is_end(line: &str) -> bool {
     let word = line.split(|c: char| c.is_whitespace() || c == '$').next().unwrap_or_default();
     word.eq_ignore_ascii_case("*END")

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::parameter::Parameters;
 use crate::{
     bundle::Bundle,
-    include::{beside, candidates, lines, path_of},
+    include::{beside, candidates, has_end, lines, path_of},
     log::Log,
     place::Place,
 };
@@ -249,7 +249,22 @@ impl<'a> Walk<'_, 'a> {
             self.close(block.take(), depth);
             block = self.open(at, keyword, &mut width);
         }
+        if let Some(block) = block.as_ref().filter(|_| depth == 0) {
+            self.warn_of_cut(block, text);
+        }
         self.close(block, depth);
+    }
+
+    /// Warns of a deck that ends among its nodes or elements, as one does whose upload was cut off.
+    fn warn_of_cut(&self, last: &Block<'_>, text: &str) {
+        let is_long = last.keyword == "NODE" || last.keyword.starts_with("ELEMENT_");
+        if is_long && !has_end(text) {
+            let words = format!(
+                "the file ends with a *{}, without *END: if it was cut off, nodes, elements or conditions are missing",
+                self.log.quote(&last.keyword)
+            );
+            self.log.warn(last.cards.last().map_or(last.at, |card| card.at), words);
+        }
     }
 
     /// A keyword line; none where the case that it belongs to is not chosen.
