@@ -44,6 +44,7 @@ use mechanics::{
 use crate::{
     log::Log,
     model::Model,
+    place::Place,
     typed::{Deck, mesh::Meshes},
 };
 use material::Materials;
@@ -64,6 +65,11 @@ pub(crate) fn model(deck: &Deck, meshes: &Meshes, log: &Log<'_>) -> Option<Model
     let joins = assembly::joins(&deck.joins, &names, log);
     let mut assembly = assembly::assemble(&parts, &joins, &materials, meshes, log)?;
     log.wanted()?;
+    if assembly.mesh.n_elements() == 0 && log.count() == 0 {
+        let at = deck.control.as_ref().map_or(Place::text(0), |control| control.at);
+        log.fault(at, "a deck without elements", "at least one element", "give a [[part]] a mesh");
+        return None;
+    }
     let curves = Curves::of(&deck.curves, log);
     let (rigid, switched) = rigid::drafts(&deck.rigid, &names, &curves, &assembly, log);
     let clamps = clamp::boundaries(&deck.parts, &parts, log);

@@ -469,6 +469,11 @@ impl<'a> Value<'a> {
         self.answered("a list", matches!(self.value, DeValue::Array(_)))
     }
 
+    /// Whether the value is a list of nothing.
+    pub fn is_empty_list(&self) -> bool {
+        matches!(self.value, DeValue::Array(list) if list.is_empty())
+    }
+
     pub fn is_table(&self) -> bool {
         self.answered("a table", matches!(self.value, DeValue::Table(_)))
     }

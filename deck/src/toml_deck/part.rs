@@ -45,8 +45,12 @@ pub(super) fn read_materials(deck: &Table<'_>) -> Vec<Own> {
 pub(super) fn read_parts(deck: &Table<'_>, planes: [bool; 3]) -> Vec<Part> {
     deck.must_have("part", "at least one [[part]]");
     let tables = deck.tables("part", MAX_PARTS);
-    if tables.is_empty() && !deck.has("part") {
-        deck.faults.add(0, "a deck without [[part]]", "at least one part", "add a [[part]]");
+    let given = deck.get("part");
+    // One that is no list, or too long a one, was told.
+    let is_empty = given.is_none_or(|value| value.is_empty_list());
+    if tables.is_empty() && is_empty {
+        let at = given.map_or(0, |value| value.at);
+        deck.faults.add(at, "a deck without [[part]]", "at least one part", "add a [[part]]");
     }
     let part = |(n, table): (usize, Table<'_>)| {
         let value = table.require("name", "a name in quotes");
