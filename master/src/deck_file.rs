@@ -94,23 +94,37 @@ fn folder_of(deck: &Path) -> Option<PathBuf> {
     std::fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()
 }
 
-/// A file that a deck refers to, with its bytes. Decks from machines that do not tell capitals from small letters name files in
-/// either: where no file has the name, the only one that differs from it in case is taken.
+/// Most folders of a path that is looked for in any case.
+const MAX_FOLDERS: usize = 64;
+
+/// A file that a deck refers to, with its bytes. Decks from machines that do not tell capitals from small letters name files and folders
+/// in either: where none has the name, the only one that differs from it in case is taken.
 fn read_in_any_case(path: &str) -> Option<(PathBuf, Vec<u8>)> {
     let path = Path::new(path);
     if let Ok(bytes) = bundle::bytes_of(path) {
         return Some((path.to_owned(), bytes));
     }
-    let wanted = path.file_name()?.to_str()?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    if path.components().nth(MAX_FOLDERS).is_some() {
+        return None;
+    }
+    let mut found = PathBuf::new();
+    for part in path.components() {
+        let next = found.join(part);
+        let is_there = next.symlink_metadata().is_ok();
+        found = if is_there { next } else { in_any_case(&found, part.as_os_str().to_str()?)? };
+    }
+    bundle::bytes_of(&found).ok().map(|bytes| (found, bytes))
+}
+
+/// The only entry of a folder whose name differs from `wanted` in case alone.
+fn in_any_case(folder: &Path, wanted: &str) -> Option<PathBuf> {
+    let here = Path::new(".");
+    let entries = std::fs::read_dir(if folder.as_os_str().is_empty() { here } else { folder }).ok()?;
     let same = |entry: &std::fs::DirEntry| {
         entry.file_name().to_str().is_some_and(|name| name.eq_ignore_ascii_case(wanted))
     };
     let mut found = entries.flatten().filter(same);
-    let only = found.next().filter(|_| found.next().is_none())?;
-    let path = only.path();
-    bundle::bytes_of(&path).ok().map(|bytes| (path, bytes))
+    found.next().filter(|_| found.next().is_none()).map(|only| only.path())
 }
 
 /// Why a deck cannot be used.
@@ -186,6 +200,12 @@ mod tests {
         std::fs::write(path("model.K"), "*TITLE\nanother\n").expect("a new file");
         // Which of two is meant cannot be told.
         assert!(!gathered().contains("*TITLE"), "{}", gathered());
+        // Folders, too.
+        std::fs::create_dir_all(path("parts/Nose")).expect("a folder");
+        std::fs::write(path("parts/Nose/mesh.k"), "*TITLE\nin a folder\n").expect("a new file");
+        std::fs::write(path("main.k"), "*KEYWORD\n*INCLUDE\n./PARTS/nose/../NOSE/MESH.K\n*END\n")
+            .expect("a deck");
+        assert!(gathered().contains("*TITLE\nin a folder"), "{}", gathered());
         std::fs::remove_dir_all(&folder).expect("the folder of this test");
     }
 }
