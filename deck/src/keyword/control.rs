@@ -1,11 +1,14 @@
 //! `*CONTROL_` and `*DATABASE_`: how long and how finely, and what is written.
 
+use std::collections::BTreeMap;
+
 use super::{
     cards::Block,
     fields::{Context, TENS},
 };
 use crate::{
     geometry,
+    log::Log,
     place::{Place, Placed},
 };
 
@@ -132,6 +135,10 @@ pub(super) struct ControlCards {
     pub(super) freed_nodes: Option<(Place, bool)>,
     /// Whether the thickness of shells follows their strains.
     pub(super) shells_thin: bool,
+    /// A set of parts, whose shells alone do, or with a minus do not; 0 is none.
+    pub(super) thinning_set: Option<(Place, i64)>,
+    /// Whether points through the thickness of shells are Lobatto's where QR says nothing, from three points on.
+    pub(super) lobatto: bool,
     /// THEORY of `*CONTROL_SHELL`: ELFORM of sections that leave it blank.
     pub(super) theory: Option<Placed<i64>>,
     pub(super) period: Option<(Place, f64)>,
@@ -142,6 +149,8 @@ pub(super) struct ControlCards {
     /// The same of solids (0) and shells (1).
     pub(super) element_gauges: [Vec<(Place, u32)>; 2],
     pub(super) element_gauge_sets: [Vec<(Place, u32)>; 2],
+    /// Place and cards of the last of each keyword.
+    seen: BTreeMap<String, (Place, Vec<String>)>,
 }
 
 impl ControlCards {
@@ -150,6 +159,7 @@ impl ControlCards {
         let log = context.log;
         // One set each; further cards say how a computation is carried out.
         block.leave_all();
+        self.compare(block, log);
         let card = block.card(0);
         let f = context.fields(card, block.width, &TENS);
         match block.keyword.as_str() {
@@ -165,6 +175,9 @@ impl ControlCards {
                         "ENDENG: the run does not stop by its energy; the summary has the error",
                     );
                 }
+                if f.real(2, 0.0) != 0.0 {
+                    log.warn(card.at, "DTMIN: the run does not end where the time step has fallen by it");
+                }
                 if f.integer(5) != 0 {
                     f.fault(5, "NOSOL 0", "check the deck with bolide check");
                 }
@@ -175,6 +188,9 @@ impl ControlCards {
                     f.fault(1, "a factor above 0 and at most 1", "leave TSSFAC blank for 0.9");
                 } else if factor > 0.0 {
                     self.step_factor = Some((card.at, factor));
+                }
+                if f.real(0, 0.0) != 0.0 {
+                    log.warn(card.at, "DTINIT: the first step is that of the elements");
                 }
                 if f.real(4, 0.0) != 0.0 {
                     log.warn(card.at, "DT2MS: no mass is added; small elements rule the time step");
@@ -193,7 +209,12 @@ impl ControlCards {
                 }
             }
             "CONTROL_BULK_VISCOSITY" => {
-                let [quadratic, linear] = [f.real(0, 1.5), f.real(1, 0.06)];
+                // LS-DYNA takes its own where a field is 0, as where it is blank.
+                let or_usual = |i: usize, usual: f64| match f.real(i, usual) {
+                    0.0 => usual,
+                    given => given,
+                };
+                let [quadratic, linear] = [or_usual(0, 1.5), or_usual(1, 0.06)];
                 let kind = f.integer(2);
                 if !matches!(kind, 0 | 1) {
                     let words = format!("TYPE {kind}: bulk viscosity is that of solids, as with TYPE 1");
@@ -239,6 +260,17 @@ impl ControlCards {
                 "take the keyword out if the problem does without it",
             ),
             "CONTROL_SHELL" => {
+                let cards = [block.card(2), block.card(3)];
+                let [third, fourth] = [0, 1].map(|i| context.fields(cards[i], block.width, &TENS));
+                self.thinning_set = Some((third.at, third.integer(0))).filter(|(_, set)| *set != 0);
+                if [0, 1].iter().any(|i| fourth.integer(*i) != 0) {
+                    log.warn(
+                        fourth.at,
+                        "NFAIL1, NFAIL4: shells that are distorted do not leave; they do by the erosion of their part",
+                    );
+                }
+                let second = block.card(1);
+                self.lobatto = context.fields(second, block.width, &TENS).integer(1) == 1;
                 self.theory = Some(f.placed(4, "THEORY", f.integer(4)));
                 let update = f.integer(3);
                 // 2 is of thick shells alone.
@@ -267,6 +299,21 @@ impl ControlCards {
                 "a *CONTROL_ of the table in deck/README.md",
                 "take it out; leaving it out may change what is computed",
             ),
+        }
+    }
+
+    /// Warns of a keyword that another of its name contradicts.
+    fn compare(&mut self, block: &Block<'_>, log: &Log<'_>) {
+        let words: Vec<String> = block.cards.iter().map(|card| card.text.trim().to_string()).collect();
+        let Some((first, other)) = self.seen.insert(block.keyword.clone(), (block.at, words)) else { return };
+        let changes = !HARMLESS.contains(&block.keyword.as_str());
+        if changes && self.seen.get(&block.keyword).is_some_and(|(_, words)| *words != other) {
+            let word = log.quote(&block.keyword);
+            let line = log.line(first, block.at);
+            log.warn(
+                block.at,
+                format!("a second *{word}, other than that of {line}: what both say is as here"),
+            );
         }
     }
 

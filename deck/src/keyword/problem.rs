@@ -128,6 +128,8 @@ pub(super) struct ShellSection {
     pub(super) points: u32,
     /// Whether they are Lobatto's, else Gauss's.
     pub(super) lobatto: bool,
+    /// Whether INTGRD of `*CONTROL_SHELL` may make them Lobatto's, as QR says nothing else.
+    pub(super) is_by_deck: bool,
     /// Points in the plane; one of a composite.
     pub(super) in_plane: InPlane,
     pub(super) is_membrane: bool,

@@ -122,6 +122,7 @@ pub(super) fn read_composite(problem: &mut Problem, block: &Block<'_>, context: 
         is_by_theory: f.integer(1) == 0,
         points: 1,
         lobatto: false,
+        is_by_deck: false,
         in_plane: InPlane::One,
         is_membrane: false,
         angles: Vec::new(),
@@ -218,6 +219,12 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
             f.fault(5, "QR 0, 1 or 2", "take a rule of points that is built in");
         }
         let lobatto = rule == 1.0;
+        if lobatto {
+            context.log.warn(
+                card.at,
+                "QR 1, a trapezoidal rule: points through the thickness are those of Lobatto, which has some on both sides, too",
+            );
+        }
         if rule > 1.0 {
             context.log.warn(card.at, "QR: points through the thickness are those of Gauss");
         }
@@ -243,8 +250,9 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
                 );
             }
             let corners = [0, 1, 2, 3].map(|i| g.real(i, 0.0));
-            let all = corners[1..].iter().all(|t| *t > 0.0);
-            if all { corners.iter().sum::<f64>() / 4.0 } else { corners[0] }
+            // T1 is the default of the others.
+            let or_first = |t: &f64| if *t > 0.0 { *t } else { corners[0] };
+            corners.iter().map(or_first).sum::<f64>() / 4.0
         });
         let mut angles = Vec::new();
         let mut left = if is_composite { asked.clamp(0, MAX_LAYERS as i64) as usize } else { 0 };
@@ -273,6 +281,7 @@ pub(super) fn read_shell_sections(problem: &mut Problem, block: &Block<'_>, cont
             is_by_theory: f.integer(1) == 0,
             points,
             lobatto,
+            is_by_deck: rule == 0.0,
             in_plane,
             is_membrane,
             angles,

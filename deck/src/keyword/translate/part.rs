@@ -70,8 +70,12 @@ pub(super) fn write(t: &mut Translation<'_>) {
         let at = part.at;
         let kind = match (t.thicknesses.get(&id), problem.sections.get(&part.section.value)) {
             (Some(thickness), Some((_, Section::Shell(shell)))) => {
-                let rule =
-                    if shell.lobatto { Rule::Lobatto(shell.points) } else { Rule::Gauss(shell.points) };
+                // Composites of plies have one point in each.
+                let by_deck = problem.control.lobatto && shell.is_by_deck && shell.points >= 3;
+                let rule = match shell.lobatto || by_deck {
+                    true => Rule::Lobatto(shell.points),
+                    false => Rule::Gauss(shell.points),
+                };
                 let thickness = t.number(at, "a thickness of", *thickness);
                 let fibres = problem.materials.get(&part.material.value).and_then(|card| card.fibres);
                 let laminate = laminate(shell, fibres);
@@ -84,7 +88,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
                     (_, asked) => asked,
                 };
                 Kind::Shells(mesh::Section {
-                    thins: problem.control.shells_thin,
+                    thins: problem.control.shells_thin && may_thin(t, id),
                     laminate,
                     in_plane,
                     is_membrane: shell.is_membrane,
@@ -151,6 +155,13 @@ pub(super) fn write(t: &mut Translation<'_>) {
     // Nodes of several parts get theirs from the mesh wherever one part would give them another.
     t.mesh.velocities = apart.iter().map(|node| (*node, of(node))).collect();
     t.mesh.spins = turning.iter().map(|node| (*node, spin[node])).collect();
+}
+
+/// Whether PSSTUPD lets the shells of a part thin.
+fn may_thin(t: &Translation<'_>, part: u32) -> bool {
+    let Some((at, set)) = t.problem.control.thinning_set else { return true };
+    let number = u32::try_from(set.unsigned_abs()).unwrap_or(u32::MAX);
+    t.problem.part_set(number, at, t.log).contains(&part) == (set > 0)
 }
 
 /// The force of a cable at the start; none after a fault.
