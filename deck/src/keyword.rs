@@ -28,6 +28,7 @@ mod mesh;
 mod mesh_alone;
 mod moving;
 mod parameter;
+mod prescribed;
 mod problem;
 mod property;
 mod read;
@@ -37,6 +38,7 @@ mod stress;
 mod translate;
 mod transmit;
 mod unit;
+mod velocity;
 
 pub(crate) use expression::evaluate;
 pub(crate) use mesh_alone::read_mesh;

@@ -1,5 +1,4 @@
-//! `*INITIAL_`, `*BOUNDARY_`, `*LOAD_`, `*RIGIDWALL_`, `*ELEMENT_MASS`: what nodes start with, what holds, moves, pushes, loads and
-//! stops them.
+//! `*BOUNDARY_`, `*LOAD_`, `*RIGIDWALL_`, `*ELEMENT_MASS`: what holds, pushes, loads and stops nodes.
 
 use std::collections::BTreeMap;
 
@@ -9,6 +8,8 @@ use super::{
     blast::Blasted,
     cards::{Block, Card},
     fields::{Context, Fields, TENS},
+    prescribed::{Motion, Way, motions},
+    velocity::{self, Velocity},
 };
 use crate::{geometry, place::Place, table::Range};
 
@@ -20,23 +21,6 @@ pub(super) enum Target {
     NodeSet(u32),
     Part(u32),
     PartSet(u32),
-}
-
-/// An initial velocity: a translation and a rotation about an axis.
-pub(super) struct Velocity {
-    pub(super) at: Place,
-    pub(super) target: Target,
-    /// Set of nodes that are left out, and the box that bounds the others; 0 is none.
-    pub(super) except: u32,
-    pub(super) inside: u32,
-    pub(super) velocity: [f64; 3],
-    /// Angular velocity, and a point of its axis.
-    pub(super) spin: [f64; 3],
-    pub(super) point: [f64; 3],
-    /// Coordinate system of both vectors; 0 is the global one.
-    pub(super) system: u32,
-    /// Whether the rotations that were given turn each node about itself, as shells can.
-    pub(super) own_turn: [f64; 3],
 }
 
 /// Axes along or about which a code from 0 to 7 holds: none, x, y, z, xy, yz, zx, all.
@@ -58,56 +42,6 @@ pub(super) struct Held {
     pub(super) system: u32,
     /// x, y, z, then the rotations about them.
     pub(super) axes: [bool; 6],
-    pub(super) span: Span,
-}
-
-/// How a curve is meant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Meaning {
-    Velocity,
-    Acceleration,
-    Displacement,
-}
-
-impl Meaning {
-    /// VAD, in field `i`; another is reported.
-    pub(super) fn read(f: &Fields<'_>, i: usize) -> Option<Self> {
-        match f.integer(i) {
-            0 => Some(Self::Velocity),
-            1 => Some(Self::Acceleration),
-            2 => Some(Self::Displacement),
-            _ => {
-                f.fault(i, "VAD 0, 1 or 2", "give a velocity, an acceleration or a displacement by time");
-                None
-            }
-        }
-    }
-}
-
-/// What a motion goes along or about.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Way {
-    Along(usize),
-    /// Of a body, about its centre; of a node of shells, about itself.
-    Turn(usize),
-    /// A circle about an axis through a point.
-    About(usize, [f64; 3]),
-}
-
-/// A motion by curve.
-pub(super) struct Motion {
-    pub(super) at: Place,
-    pub(super) target: Target,
-    pub(super) way: Way,
-    pub(super) how: Driven,
-}
-
-/// How a motion follows its curve, and when.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) struct Driven {
-    pub(super) meaning: Meaning,
-    pub(super) curve: u32,
-    pub(super) factor: f64,
     pub(super) span: Span,
 }
 
@@ -193,75 +127,15 @@ pub(super) struct Conditions {
 /// A time that means never.
 const NEVER: f64 = 1e15;
 
-/// Whether a second card belongs to a motion, with offsets or nodes.
-fn goes_on(f: &Fields<'_>) -> bool {
-    matches!(f.words(1).parse::<i64>(), Ok(dof) if (9..=11).contains(&dof.abs())) || f.words(2) == "4"
-}
-
-/// The motions of a `*BOUNDARY_PRESCRIBED_MOTION_`: the first card of each, and what it says.
-pub(super) fn motions<'c>(
-    block: &'c Block<'_>,
-    named: bool,
-    vectors: &BTreeMap<u32, [f64; 3]>,
-    context: &'c Context<'_>,
-    mut take: impl FnMut(&Fields<'_>, Way, Driven),
-) {
-    let mut cards = block.cards.iter();
-    while let Some(card) = next_card(&mut cards, named) {
-        let f = context.fields(card, block.width, &TENS);
-        let second = if goes_on(&f) { cards.next() } else { None };
-        let offsets = second.map_or([0.0; 2], |card| {
-            let g = context.fields(card, block.width, &TENS);
-            [g.real(0, 0.0), g.real(1, 0.0)]
-        });
-        let way = way_of(&f, offsets, vectors);
-        let meaning = Meaning::read(&f, 2);
-        let span = span_of(&f, 7, 6);
-        if span.from > 0.0 {
-            context.log.warn(f.at, "BIRTH: the curve is read at the time of the run, not from BIRTH on");
-        }
-        let (Some((way, sign)), Some(meaning)) = (way, meaning) else { continue };
-        take(&f, way, Driven { meaning, curve: f.id(3), factor: sign * scale(&f, 4), span });
-    }
-}
-
 /// The next card that is not blank; where each has a card with a number and a heading before it, the one behind that.
-fn next_card<'c, 'd>(cards: &mut std::slice::Iter<'c, Card<'d>>, named: bool) -> Option<&'c Card<'d>> {
+pub(super) fn next_card<'c, 'd>(
+    cards: &mut std::slice::Iter<'c, Card<'d>>,
+    named: bool,
+) -> Option<&'c Card<'d>> {
     if named {
         cards.next()?.mark();
     }
     cards.find(|card| !card.text.trim().is_empty())
-}
-
-/// What DOF says, and the sign of the motion; none after a fault.
-fn way_of(
-    f: &Fields<'_>,
-    [first, second]: [f64; 2],
-    vectors: &BTreeMap<u32, [f64; 3]>,
-) -> Option<(Way, f64)> {
-    match f.integer(1) {
-        dof @ 1..=3 => Some((Way::Along(dof as usize - 1), 1.0)),
-        dof @ 5..=7 => Some((Way::Turn(dof as usize - 5), 1.0)),
-        dof @ (4 | 8) => {
-            let Some(vector) = vectors.get(&f.id(5)).copied() else {
-                f.fault(5, "the number of a *DEFINE_VECTOR", "define it, or give DOF 1 to 3 or 5 to 7");
-                return None;
-            };
-            let Some(axis) = (0..3).find(|a| vector[*a].abs() > 1.0 - 1e-9) else {
-                f.fault(5, "a vector along x, y or z", "turn the mesh so that motions are along the axes");
-                return None;
-            };
-            Some((if dof == 4 { Way::Along(axis) } else { Way::Turn(axis) }, vector[axis].signum()))
-        }
-        9 => Some((Way::About(0, [0.0, first, second]), 1.0)),
-        10 => Some((Way::About(1, [second, 0.0, first]), 1.0)),
-        11 => Some((Way::About(2, [first, second, 0.0]), 1.0)),
-        _ => {
-            let expected = "DOF 1 to 3 along x, y or z, 5 to 7 about them, 4 or 8 along or about a vector, 9 to 11 on circles";
-            f.fault(1, expected, "give components along or about the global axes");
-            None
-        }
-    }
 }
 
 /// The span of a birth and a death time; a faulty one is reported.
@@ -339,8 +213,8 @@ impl Conditions {
         }
         let word = block.keyword.clone();
         match word.as_str() {
-            "INITIAL_VELOCITY" => self.velocity(block, context),
-            "INITIAL_VELOCITY_GENERATION" => self.generation(block, context),
+            "INITIAL_VELOCITY" => velocity::read(&mut self.velocities, block, context),
+            "INITIAL_VELOCITY_GENERATION" => velocity::read_generation(&mut self.velocities, block, context),
             word if word.starts_with("RIGIDWALL") => {
                 let forces = word.ends_with("_FORCES");
                 let each = [named, true, true, word.contains("_MOVING"), forces];
@@ -392,21 +266,7 @@ impl Conditions {
         let at = f.at;
         let of_set = word.ends_with("_SET");
         match word {
-            "INITIAL_VELOCITY_NODE" => {
-                let target = Target::Node(f.id(0));
-                let turn = f.vector(4);
-                self.velocities.push(Velocity {
-                    at,
-                    target,
-                    except: 0,
-                    inside: 0,
-                    velocity: f.vector(1),
-                    spin: [0.0; 3],
-                    point: [0.0; 3],
-                    system: f.id(7),
-                    own_turn: turn,
-                });
-            }
+            "INITIAL_VELOCITY_NODE" => self.velocities.push(Velocity::of_node(f)),
             "BOUNDARY_SPC_NODE" | "BOUNDARY_SPC_SET" => {
                 let target = if of_set { Target::NodeSet(f.id(0)) } else { Target::Node(f.id(0)) };
                 let axes = [2, 3, 4, 5, 6, 7].map(|i| f.integer(i) != 0);
@@ -465,74 +325,6 @@ impl Conditions {
                     self.masses.push(Mass { at, target, mass });
                 }
             }
-        }
-    }
-
-    /// `*INITIAL_VELOCITY`: a set, and perhaps another for those it leaves out.
-    fn velocity(&mut self, block: &Block<'_>, context: &Context<'_>) {
-        let cards = [block.card(0), block.card(1), block.card(2)];
-        let [f, g, h] = [0, 1, 2].map(|i| context.fields(cards[i], block.width, &TENS));
-        let base = |target, except, inside, velocity, own_turn| Velocity {
-            at: f.at,
-            target,
-            except,
-            inside,
-            velocity,
-            spin: [0.0; 3],
-            point: [0.0; 3],
-            system: f.id(4),
-            own_turn,
-        };
-        let target = if f.id(0) == 0 { Target::All } else { Target::NodeSet(f.id(0)) };
-        self.velocities.push(base(target, f.id(1), f.id(2), g.vector(0), g.vector(3)));
-        if f.id(1) != 0 && !h.all_blank() {
-            self.velocities.push(base(Target::NodeSet(f.id(1)), 0, 0, h.vector(0), h.vector(3)));
-        }
-    }
-
-    /// `*INITIAL_VELOCITY_GENERATION`: two cards each.
-    fn generation(&mut self, block: &Block<'_>, context: &Context<'_>) {
-        let n = block.cards.len().div_ceil(2);
-        for i in 0..n {
-            let cards = [block.card(2 * i), block.card(2 * i + 1)];
-            let [f, g] = [0, 1].map(|i| context.fields(cards[i], block.width, &TENS));
-            let id = f.id(0);
-            let target = match f.integer(1) {
-                _ if id == 0 => Target::All,
-                1 => Target::PartSet(id),
-                2 => Target::Part(id),
-                3 => Target::NodeSet(id),
-                _ => {
-                    f.fault(1, "STYP 1, 2 or 3", "name a set of parts, a part, or a set of nodes");
-                    continue;
-                }
-            };
-            if g.integer(6) != 0 {
-                g.fault(6, "PHASE 0", "start with the velocity");
-            }
-            let omega = f.real(2, 0.0);
-            let axis = g.vector(3);
-            let mut spin = [0.0; 3];
-            if omega != 0.0 {
-                if axis[0] == -999.0 {
-                    g.fault(3, "an axis by its direction", "give NX, NY, NZ instead of nodes");
-                }
-                match geometry::unit(axis) {
-                    Some(axis) => spin = axis.map(|c| omega * c),
-                    None => g.fault(3, "an axis of some length", "give NX, NY, NZ"),
-                }
-            }
-            self.velocities.push(Velocity {
-                at: f.at,
-                target,
-                except: 0,
-                inside: 0,
-                velocity: f.vector(3),
-                spin,
-                point: g.vector(0),
-                system: f.id(7),
-                own_turn: [0.0; 3],
-            });
         }
     }
 

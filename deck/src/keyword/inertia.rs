@@ -80,6 +80,14 @@ pub(super) fn read(problem: &mut Problem, block: &Block<'_>, context: &Context<'
 }
 
 impl Problem {
+    /// The centre of mass that a card gives; none where it names a node that the deck does not have.
+    pub(super) fn centre_of(&self, given: &Inertia) -> Option<[f64; 3]> {
+        match given.centre {
+            Centre::Point(point) => Some(point),
+            Centre::Node(id) => self.position(id),
+        }
+    }
+
     /// Mass, centre and inertia of the body of these parts, where cards give it; a fault is reported.
     pub(super) fn inertia_of(&self, parts: &[u32], log: &crate::log::Log<'_>) -> Option<MassAndInertia> {
         let given = parts.iter().find_map(|part| self.rigid.inertias.get(part))?;
@@ -93,10 +101,7 @@ impl Problem {
             );
             return None;
         }
-        let centre = match given.centre {
-            Centre::Point(point) => Some(point),
-            Centre::Node(id) => self.position(id),
-        };
+        let centre = self.centre_of(given);
         if centre.is_none() {
             log.fault(
                 given.at,

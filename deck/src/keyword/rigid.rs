@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use super::{
     cards::Block,
-    condition::{AXES_OF_CODE, Driven, Target, Way, motions},
+    condition::{AXES_OF_CODE, Target},
     fields::{Context, Fields, TENS},
     inertia::Inertia,
+    prescribed::{Driven, Way, motions},
 };
 use crate::{place::Place, table::Range};
 

@@ -14,6 +14,7 @@ mod motion;
 mod moving;
 mod output;
 mod part;
+mod reference;
 mod rigid;
 mod state;
 mod stress;
@@ -38,6 +39,7 @@ pub(super) fn translate(
     element::read(&mut t);
     part::name_all(&mut t);
     rigid::find_bodies(&mut t);
+    reference::find(&mut t);
     control::write(&mut t, units);
     material::write(&mut t);
     part::write(&mut t);

@@ -13,6 +13,7 @@ mod laws;
 mod moving;
 mod mutations;
 mod records;
+mod reference;
 mod rigid;
 mod silence;
 mod spans;

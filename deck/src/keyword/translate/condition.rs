@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, HashMap};
 
 use mechanics::load::{MAX_FORCES, Span};
 
-use super::{element::corners_of, moving::is_of_nozzle, state::Translation};
+use super::{element::corners_of, moving::is_of_nozzle, reference, state::Translation};
 use crate::{
     geometry::{dot, key_of_face, sub, unit},
     keyword::{
-        condition::{AXES_OF_CODE, Driven, Meaning, Target, Way},
+        condition::{AXES_OF_CODE, Held, Target},
+        prescribed::{Driven, Meaning, Way},
         problem::Problem,
     },
     place::Place,
@@ -23,7 +24,7 @@ const FREE: Components = [const { None }; 3];
 
 /// What is held at rest, by the axes that are.
 pub(super) fn write_held(t: &mut Translation<'_>) {
-    let (problem, log) = (t.problem, t.log);
+    let problem = t.problem;
     // By node and span: translations, then rotations.
     type Holding = ([[bool; 3]; 2], Place);
     let mut of_node: BTreeMap<(u32, [u64; 2]), Holding> = BTreeMap::new();
@@ -38,24 +39,7 @@ pub(super) fn write_held(t: &mut Translation<'_>) {
         hold(node.id, node.held.map(|code| AXES_OF_CODE[usize::from(code)]), Span::ALWAYS, node.at);
     }
     for given in &problem.conditions.held {
-        let [x, y, z, turn_x, turn_y, turn_z] = given.axes;
-        let directions = t.directions(given.system, given.at);
-        let axes = [[x, y, z], [turn_x, turn_y, turn_z]].map(|local| {
-            let Some(directions) = directions.filter(|_| local != [true; 3]) else { return local };
-            let mut axes = [false; 3];
-            for (direction, _) in directions.iter().zip(local).filter(|(_, held)| *held) {
-                match (0..3).find(|a| direction[*a].abs() > 1.0 - 1e-9) {
-                    Some(axis) => axes[axis] = true,
-                    None => log.fault(
-                        given.at,
-                        format!("nodes held along {direction:?}"),
-                        "a direction along x, y or z",
-                        "turn the mesh so that symmetry planes are those of the axes",
-                    ),
-                }
-            }
-            axes
-        });
+        let axes = axes_of(t, given);
         for node in t.nodes(given.target, given.at) {
             hold(node, axes, given.span, given.at);
         }
@@ -98,6 +82,28 @@ pub(super) fn write_held(t: &mut Translation<'_>) {
     }
 }
 
+/// The axes along and about which a support holds.
+pub(super) fn axes_of(t: &Translation<'_>, given: &Held) -> [[bool; 3]; 2] {
+    let [x, y, z, turn_x, turn_y, turn_z] = given.axes;
+    let directions = t.directions(given.system, given.at);
+    [[x, y, z], [turn_x, turn_y, turn_z]].map(|local| {
+        let Some(directions) = directions.filter(|_| local != [true; 3]) else { return local };
+        let mut axes = [false; 3];
+        for (direction, _) in directions.iter().zip(local).filter(|(_, held)| *held) {
+            match (0..3).find(|a| direction[*a].abs() > 1.0 - 1e-9) {
+                Some(axis) => axes[axis] = true,
+                None => t.log.fault(
+                    given.at,
+                    format!("nodes held along {direction:?}"),
+                    "a direction along x, y or z",
+                    "turn the mesh so that symmetry planes are those of the axes",
+                ),
+            }
+        }
+        axes
+    })
+}
+
 fn push_boundary(t: &mut Translation<'_>, at: Place, title: &str, kind: BoundaryKind) {
     t.deck.boundaries.push(Boundary { at, title: title.to_string(), parts: Parts::All, kind });
 }
@@ -109,7 +115,9 @@ pub(super) fn write_motions(t: &mut Translation<'_>) {
         let nodes = t.nodes(given.target, given.at);
         let Some(drive) = driven(t, &given.how, given.at) else { continue };
         if nodes.is_empty() {
-            if !is_of_nozzle(t, given) {
+            // What moves the body of such a node was said there.
+            let is_of_body = t.named(given.target, given.at).into_iter().any(|node| t.references.has(node));
+            if !is_of_nozzle(t, given) && !is_of_body {
                 t.log.warn(given.at, "a motion of no node that has an element");
             }
             continue;
@@ -255,27 +263,33 @@ pub(super) fn write_part_gravities(t: &mut Translation<'_>) {
 /// Forces, alike ones together.
 pub(super) fn write_forces(t: &mut Translation<'_>) {
     let problem = t.problem;
-    // By curve, axis, factor and system: how often each node is named.
-    type Group = (Place, BTreeMap<u32, u32>);
+    // By curve, axis, factor and system: how often each node is named, or its shares of forces at nodes without elements.
+    type Group = (Place, BTreeMap<u32, f64>);
     let mut groups: BTreeMap<(u32, usize, u64, u32), Group> = BTreeMap::new();
     for given in &problem.conditions.forces {
         let key = (given.curve, given.axis, given.factor.to_bits(), given.system);
-        let nodes = t.nodes(given.target, given.at);
+        reference::warn_of_idle(t, given.target, "a force", given.at);
         let group = groups.entry(key).or_insert((given.at, BTreeMap::new()));
-        for node in nodes {
-            *group.1.entry(node).or_default() += 1;
+        for node in t.named(given.target, given.at) {
+            let shares = match t.used.contains(&node) {
+                true => vec![(node, 1.0)],
+                false => reference::shares(t, node, given.at).unwrap_or_default(),
+            };
+            for (node, share) in shares {
+                *group.1.entry(node).or_default() += share;
+            }
         }
     }
     let mut n = 0;
     for ((curve, axis, bits, system), (at, nodes)) in groups {
         let Some(curve) = t.curve(curve, Meaning::Velocity, at) else { continue };
         // A node that is named several times is pushed as often.
-        let most = nodes.values().copied().max().unwrap_or(0);
-        for times in 1..=most {
-            let list: Vec<u32> = nodes.iter().filter(|(_, t)| **t == times).map(|(node, _)| *node).collect();
-            if list.is_empty() {
-                continue;
-            }
+        let mut lists: BTreeMap<u64, Vec<u32>> = BTreeMap::new();
+        for (node, times) in nodes {
+            lists.entry(times.to_bits()).or_default().push(node);
+        }
+        for (times, list) in lists {
+            let times = f64::from_bits(times);
             n += 1;
             if n == MAX_FORCES + 1 {
                 let expected =
@@ -287,7 +301,7 @@ pub(super) fn write_forces(t: &mut Translation<'_>) {
             }
             let nodes = Some(Region::Set(t.set(&format!("force {n}"), list, at)));
             let mut force = [0.0; 3];
-            force[axis] = f64::from_bits(bits) * f64::from(times);
+            force[axis] = f64::from_bits(bits) * times;
             let force = if system == 0 { force } else { t.turned(force, system, at) };
             let force = Some(t.vector(at, "a force of", force));
             let drive = Drive::along(curve.clone(), 1.0);

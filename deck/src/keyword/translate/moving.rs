@@ -7,8 +7,9 @@ use super::{
 use crate::{
     geometry::{norm, sub},
     keyword::{
-        condition::{Meaning, Motion, Target, Way},
+        condition::Target,
         moving::{Nozzle, Pressed},
+        prescribed::{Meaning, Motion, Way},
         rigid::BodyNodes,
     },
     place::{Place, Placed},

@@ -38,6 +38,12 @@ pub(super) fn write(t: &mut Translation<'_>) {
     for (at, set) in &control.gauge_sets {
         gauges.extend(problem.node_set(*set, *at, log).into_iter().map(|id| (id, *at)));
     }
+    if let Some((id, at)) = gauges.iter().find(|(id, _)| t.references.has(**id)) {
+        let words = format!(
+            "the history of node {id}, which has no element, is not written: name a node of its rigid body that has one"
+        );
+        log.warn(*at, words);
+    }
     gauges.retain(|id, _| t.used.contains(id));
     if let Some((_, at)) = gauges.iter().nth(MAX_GAUGES) {
         let n = gauges.len();

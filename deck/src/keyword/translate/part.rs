@@ -204,7 +204,11 @@ fn velocities(t: &Translation<'_>) -> (ByNode, ByNode) {
         let inside = (given.inside != 0).then(|| problem.within(given.inside, given.at, log));
         let except =
             if given.except != 0 { problem.node_set(given.except, given.at, log) } else { Vec::new() };
-        for node in t.nodes(given.target, given.at) {
+        let mut nodes = t.nodes(given.target, given.at);
+        if given.of_body {
+            nodes.extend(rigid::nodes_of_bodies(t, given.target, given.at));
+        }
+        for node in nodes {
             let Some(x) = problem.position(node) else { continue };
             if except.binary_search(&node).is_ok() || inside.as_ref().is_some_and(|inside| !inside(x)) {
                 continue;

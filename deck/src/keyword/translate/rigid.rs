@@ -6,14 +6,18 @@ use mechanics::load::Span;
 
 use super::{
     condition::driven,
+    reference,
     state::{Bodies, Translation},
     switch,
 };
 use crate::{
+    geometry::{cross, sub},
     keyword::{
-        condition::Way,
+        condition::Target,
         material::Law,
+        prescribed::Way,
         rigid::{BodyNodes, Members, NodalBody},
+        velocity::{Over, Velocity},
     },
     place::Place,
     typed::condition::{Circle, Components, Drive, Parts, Region, Rigid, made},
@@ -101,6 +105,9 @@ fn starts(t: &Translation<'_>) -> BTreeMap<u32, [[f64; 3]; 2]> {
     for (part, given) in &t.problem.rigid.inertias {
         starts.extend(t.bodies.of(*part).map(|lead| (lead, given.start)));
     }
+    for given in &t.problem.conditions.velocities {
+        start_over(t, given, &mut starts);
+    }
     for start in &t.problem.rigid.starts {
         let turned = |v| t.turned(v, start.system, start.at);
         if let Some(lead) = body_at(t, start.part, start.at) {
@@ -108,6 +115,61 @@ fn starts(t: &Translation<'_>) -> BTreeMap<u32, [[f64; 3]; 2]> {
         }
     }
     starts
+}
+
+/// Puts an initial velocity over those starts of `*PART_INERTIA` that IRIGID says.
+fn start_over(t: &Translation<'_>, given: &Velocity, starts: &mut BTreeMap<u32, [[f64; 3]; 2]>) {
+    let (problem, log) = (t.problem, t.log);
+    let parts = match given.over {
+        Over::None => return,
+        Over::All | Over::InBox => None,
+        Over::Parts(set) => Some(problem.part_set(set, given.at, log)),
+        Over::Named => match given.target {
+            Target::All => None,
+            Target::Part(id) => Some(vec![id]),
+            Target::PartSet(set) => Some(problem.part_set(set, given.at, log)),
+            target => {
+                let nodes: BTreeSet<u32> = t.nodes(target, given.at).into_iter().collect();
+                let inertias = problem.rigid.inertias.keys().copied();
+                let has = |id: &u32| problem.nodes_of_part(*id).iter().any(|node| nodes.contains(node));
+                Some(inertias.filter(has).collect())
+            }
+        },
+    };
+    let in_box = matches!(given.over, Over::InBox | Over::Parts(_)) && given.inside != 0;
+    let inside = in_box.then(|| problem.within(given.inside, given.at, log));
+    let turned = |v| t.turned(v, given.system, given.at);
+    let (velocity, spin, own) = (turned(given.velocity), turned(given.spin), turned(given.own_turn));
+    for (part, inertia) in &problem.rigid.inertias {
+        let Some(lead) = t.bodies.of(*part) else { continue };
+        let Some(centre) = problem.centre_of(inertia) else { continue };
+        let is_named = parts.as_ref().is_none_or(|parts| parts.contains(part));
+        if is_named && inside.as_ref().is_none_or(|inside| inside(centre)) {
+            let round = cross(spin, sub(centre, given.point));
+            let moves = [0, 1, 2].map(|a| velocity[a] + round[a]);
+            let turns = [0, 1, 2].map(|a| spin[a] + own[a]);
+            starts.insert(lead, [moves, turns]);
+        }
+    }
+}
+
+/// The nodes of the bodies that have parts of a target: of all of their parts, and those that go with these.
+pub(super) fn nodes_of_bodies(t: &Translation<'_>, target: Target, at: Place) -> Vec<u32> {
+    let problem = t.problem;
+    let named = match target {
+        Target::Part(id) => vec![id],
+        Target::PartSet(set) => problem.part_set(set, at, t.log),
+        _ => return Vec::new(),
+    };
+    let leads: BTreeSet<u32> = named.into_iter().filter_map(|id| t.bodies.of(id)).collect();
+    let parts = t.bodies.lead.iter().filter(|(_, lead)| leads.contains(lead));
+    let mut nodes: Vec<u32> = parts.flat_map(|(part, _)| problem.nodes_of_part(*part)).collect();
+    for extra in &problem.rigid.extra {
+        if t.bodies.of(extra.part).is_some_and(|lead| leads.contains(&lead)) {
+            nodes.extend(t.nodes(extra.target, extra.at));
+        }
+    }
+    nodes
 }
 
 /// The body of a part that a card names; a part that is none is a fault at the card.
@@ -168,6 +230,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
             );
         }
         let at = problem.parts[&lead].at;
+        let held = led_by_references(t, &mut motions, lead, held);
         let ([velocity, spin], circle) = led(t, (&mut motions, lead), held, &format!("part {ruler}"));
         let nodes = extra
             .remove(&lead)
@@ -211,7 +274,8 @@ pub(super) fn write(t: &mut Translation<'_>) {
             log.warn(given.at, words);
         }
         let title = title_of(given);
-        let ([velocity, spin], circle) = led(t, (&mut motions, given.id), given.held, &title);
+        let held = led_by_references(t, &mut motions, given.id, given.held);
+        let ([velocity, spin], circle) = led(t, (&mut motions, given.id), held, &title);
         let nodes = Some(Region::Set(t.set(&title, nodes, given.at)));
         t.deck.rigid.push(Rigid {
             at: given.at,
@@ -257,6 +321,23 @@ fn extra_nodes(t: &Translation<'_>) -> BTreeMap<u32, (Place, Vec<u32>)> {
 /// Motions by body and way.
 type Motions = BTreeMap<(u32, u8, usize), (Place, Drive, [f64; 3])>;
 
+/// What holds and moves a body at its nodes without elements: the axes along and about which it is held with these, and its motions.
+fn led_by_references(
+    t: &mut Translation<'_>,
+    motions: &mut Motions,
+    key: u32,
+    held: [[bool; 3]; 2],
+) -> [[bool; 3]; 2] {
+    let held = reference::holds(t, key, held);
+    let problem = t.problem;
+    for (at, axis, index) in reference::motions(t, key, held[1]) {
+        if let Some(drive) = driven(t, &problem.conditions.motions[index].how, at) {
+            put(t, motions, (key, 0, axis), (at, drive, [0.0; 3]));
+        }
+    }
+    held
+}
+
 /// What leads a body that is held along and about some axes: velocity and spin by axis, and a circle.
 fn led(
     t: &Translation<'_>,
@@ -272,7 +353,7 @@ fn led(
                 Some((place, ..)) if held[turns][axis] => log.fault(
                     place,
                     format!("a motion of {title} along or about {name}"),
-                    "an axis that CON1 or CON2 leaves free",
+                    "an axis that CON1 or CON2 and *BOUNDARY_SPC of its nodes leave free",
                     "take one of the two out",
                 ),
                 Some((_, drive, _)) => list[axis] = Some(drive),
@@ -298,7 +379,7 @@ fn led(
 /// Motions by curve: by the part that leads or the nodal body, whether it is along, about the centre or on a circle, and axis, the
 /// place, drive and point of each.
 fn motions(t: &mut Translation<'_>) -> Motions {
-    let (problem, log) = (t.problem, t.log);
+    let problem = t.problem;
     let mut motions = Motions::new();
     for motion in &problem.rigid.motions {
         let nodal = problem.rigid.of_nodes.iter().find(|body| body.id != 0 && body.id == motion.part);
@@ -313,14 +394,20 @@ fn motions(t: &mut Translation<'_>) -> Motions {
             Way::Turn(axis) => ((lead, 1, axis), [0.0; 3]),
             Way::About(axis, point) => ((lead, 2, axis), point),
         };
-        if let Some((first, ..)) = motions.insert(key, (motion.at, drive, point)) {
-            log.fault(
-                motion.at,
-                format!("a second motion of the body of part {lead}"),
-                format!("one by axis, which {} gives", log.line(first, motion.at)),
-                "take one of the two out, or add up their curves",
-            );
-        }
+        put(t, &mut motions, key, (motion.at, drive, point));
     }
     motions
+}
+
+/// Adds a motion of a body; a second one of its kind is a fault.
+fn put(t: &Translation<'_>, motions: &mut Motions, key: (u32, u8, usize), motion: (Place, Drive, [f64; 3])) {
+    let at = motion.0;
+    if let Some((first, ..)) = motions.insert(key, motion) {
+        t.log.fault(
+            at,
+            format!("a second motion of the body of part {}", key.0),
+            format!("one by axis, which {} gives", t.log.line(first, at)),
+            "take one of the two out, or add up their curves",
+        );
+    }
 }

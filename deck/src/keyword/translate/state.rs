@@ -4,13 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     motion::{integrals, rates},
+    reference::References,
     switch::Switched,
 };
 use crate::{
-    keyword::{
-        condition::{Meaning, Target},
-        problem::Problem,
-    },
+    keyword::{condition::Target, prescribed::Meaning, problem::Problem},
     limits::MAX_CURVE_POINTS,
     log::Log,
     mesh_file::MeshFile,
@@ -49,6 +47,8 @@ pub(super) struct Translation<'p> {
     pub(super) bodies: Bodies,
     /// Parts that are rigid for a time.
     pub(super) switched: Switched,
+    /// Nodes without elements that go with rigid bodies.
+    pub(super) references: References,
     /// Pairs of parts that meet, lower number first.
     pub(super) met: BTreeSet<(u32, u32)>,
 }
@@ -70,6 +70,7 @@ impl<'p> Translation<'p> {
             curves: BTreeMap::new(),
             bodies: Bodies::default(),
             switched: Switched::default(),
+            references: References::default(),
             met: BTreeSet::new(),
         }
     }
@@ -116,8 +117,15 @@ impl<'p> Translation<'p> {
 
     /// Nodes with elements that something speaks of, ascending.
     pub(super) fn nodes(&self, target: Target, at: Place) -> Vec<u32> {
+        let mut nodes = self.named(target, at);
+        nodes.retain(|node| self.used.contains(node));
+        nodes
+    }
+
+    /// Nodes that something speaks of, ascending, with elements or without.
+    pub(super) fn named(&self, target: Target, at: Place) -> Vec<u32> {
         let (problem, log) = (self.problem, self.log);
-        let mut nodes = match target {
+        match target {
             Target::All => self.used.iter().copied().collect(),
             Target::Node(id) => {
                 if problem.position(id).is_none() {
@@ -137,9 +145,7 @@ impl<'p> Translation<'p> {
                 let all: BTreeSet<u32> = parts.iter().flat_map(|p| problem.nodes_of_part(*p)).collect();
                 all.into_iter().collect()
             }
-        };
-        nodes.retain(|node| self.used.contains(node));
-        nodes
+        }
     }
 
     /// Keeps a set of nodes in the mesh under a name.

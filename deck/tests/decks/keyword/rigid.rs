@@ -340,3 +340,46 @@ fn sets_of_nodes_and_elements_are_the_cross_section_of_the_plane_between_them() 
     let found = faults(ELASTIC, "*SET_NODE_LIST\n9\n5,6\n*DATABASE_CROSS_SECTION_SET\n9,3\n");
     assert!(found.len() == 1 && found[0].contains("expected a set of solids of the deck"), "{found:?}");
 }
+
+#[test]
+fn irigid_goes_over_the_start_of_an_inertia_and_ivatn_takes_the_whole_body() {
+    let inertia = "*PART_INERTIA\nram\n4,2,1\n25,5,5,1e-2\n1.0,0,0,1.0,0,1.0\n0,0,5\n";
+    let start = |more: &str| {
+        let text = deck_of(ELASTIC, &format!("{inertia}{more}")).replace("ram\n4,2,1\n*SECTION", "*SECTION");
+        let model = deck::read(&text, "a.k").unwrap_or_else(|f| panic!("{}", lines(&f)));
+        let start = &model.setup.bodies[1].start;
+        (start.velocity, start.spin)
+    };
+    let (own, given) = (([0.0, 0.0, 5.0], [0.0; 3]), ([1.0, 2.0, 3.0], [0.0; 3]));
+    let boxes = "*DEFINE_BOX\n1,0,100,0,100,0,100\n*DEFINE_BOX\n2,0,1,0,1,0,1\n*SET_PART_LIST\n7\n4\n*SET_PART_LIST\n8\n1\n";
+    for (card, expected) in [
+        ("0,0,0,0", own),
+        ("0,0,0,-2", given),
+        ("0,0,2,-2", given),
+        ("0,0,1,-1", given),
+        ("0,0,2,-1", own),
+        ("0,0,0,7", given),
+        ("0,0,2,7", own),
+        ("0,0,0,8", own),
+    ] {
+        assert_eq!(start(&format!("{boxes}*INITIAL_VELOCITY\n{card}\n1,2,3\n")), expected, "{card}");
+    }
+    assert_eq!(start("*INITIAL_VELOCITY\n0,0,0,-2\n1,2,3,6\n"), ([1.0, 2.0, 3.0], [6.0, 0.0, 0.0]));
+    let generated = |id: u32, over: u32| {
+        start(&format!("*INITIAL_VELOCITY_GENERATION\n{id},2,2,1,2,3\n25,4,5,1,0,0,0,{over}\n"))
+    };
+    assert_eq!(generated(4, 0), own);
+    assert_eq!(generated(4, 1), ([1.0, 2.0, 5.0], [2.0, 0.0, 0.0]));
+    assert_eq!(generated(1, 1), own);
+    let text = deck_of(ELASTIC, &format!("{inertia}*INITIAL_VELOCITY\n0,0,0,-3\n1,2,3\n"));
+    let told = deck::read(&text.replace("ram\n4,2,1\n*SECTION", "*SECTION"), "a.k").expect_err("IRIGID -3");
+    assert!(told[0].to_string().contains("IRIGID 0, -1, -2 or the number of a set of parts"), "{told:?}");
+    // Of a body of two parts, where the card names one.
+    let merged = |card: &str| {
+        let more =
+            format!("*CONSTRAINED_RIGID_BODIES\n1,4\n*INITIAL_VELOCITY_GENERATION\n{card}\n0,0,0,0,0,1\n");
+        good(ELASTIC, &more).setup.bodies[0].start.velocity
+    };
+    assert!(merged("4,2,0,0,0,-7")[2] > -7.0);
+    assert!((merged("4,2,0,0,0,-7,1")[2] + 7.0).abs() < 1e-9);
+}
