@@ -5,7 +5,10 @@ use super::{
     fields::{Context, TENS},
     problem::{CurveCard, Problem},
 };
-use crate::geometry::{cross, sub as minus, unit};
+use crate::{
+    fault::short,
+    geometry::{cross, sub as minus, unit},
+};
 
 /// `*DEFINE_CURVE`.
 pub(super) fn read_curve(problem: &mut Problem, block: &Block<'_>, context: &Context<'_>) {
@@ -31,7 +34,7 @@ pub(super) fn read_curve(problem: &mut Problem, block: &Block<'_>, context: &Con
         points.push([0.0; 2]);
     }
     let id = problem.number("curve", &f, context);
-    problem.curves.insert(id, CurveCard { points, relaxation });
+    problem.curves.insert(id, CurveCard { points, relaxation, offset: sa * oa });
 }
 
 /// `*DEFINE_COORDINATE_`: a set of cards for each system.
@@ -54,7 +57,12 @@ fn read_system(problem: &mut Problem, block: &Block<'_>, first: usize, context: 
             let origin = f.vector(1);
             (minus(f.vector(4), origin), minus(g.vector(0), origin))
         }
-        "DEFINE_COORDINATE_VECTOR" => (f.vector(1), f.vector(4)),
+        "DEFINE_COORDINATE_VECTOR" => {
+            if f.integer(7) != 0 {
+                f.fault(7, "a system that stands: it does not turn with a node", "leave NID blank");
+            }
+            (f.vector(1), f.vector(4))
+        }
         _ => {
             let nodes = [1, 2, 3].map(|i| {
                 let node = problem.node_index.get(&f.id(i)).map(|n| problem.nodes[*n as usize].x);
@@ -108,6 +116,10 @@ pub(super) fn read_box(problem: &mut Problem, block: &Block<'_>, context: &Conte
     for card in &block.cards {
         let f = context.fields(card, block.width, &TENS);
         let bounds = [0, 1].map(|end| [1, 3, 5].map(|i| f.real(i + end, 0.0)));
+        if let Some(a) = (0..3).find(|a| bounds[0][*a] > bounds[1][*a]) {
+            let expected = format!("a maximum not below the minimum, {}", short(bounds[0][a]));
+            f.fault(2 * a + 2, expected, "exchange the two: nothing is inside this box");
+        }
         let id = problem.number("box", &f, context);
         problem.boxes.insert(id, bounds);
     }

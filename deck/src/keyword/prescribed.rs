@@ -17,6 +17,8 @@ pub(super) enum Meaning {
     Velocity,
     Acceleration,
     Displacement,
+    /// Of something that is no time.
+    Profile,
 }
 
 impl Meaning {

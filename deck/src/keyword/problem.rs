@@ -154,6 +154,8 @@ pub(super) struct CurveCard {
     pub(super) points: Vec<[f64; 2]>,
     /// SIDR of a curve that does not act in the run itself.
     pub(super) relaxation: Option<Origin>,
+    /// By how much its abscissas were shifted.
+    pub(super) offset: f64,
 }
 
 /// The units that `*CONTROL_UNITS` names.

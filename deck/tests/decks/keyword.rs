@@ -10,6 +10,7 @@ mod hourglass;
 mod joints;
 mod laminates;
 mod laws;
+mod meaning;
 mod moving;
 mod mutations;
 mod records;

@@ -27,7 +27,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
     for (n, nozzle) in (1..).zip(&problem.nozzles) {
         let at = nozzle.at;
         let sides = segments(t, nozzle, &outward);
-        let (Some(way), Some(profile)) = (way_of(t, nozzle), t.curve(nozzle.profile, Meaning::Velocity, at))
+        let (Some(way), Some(profile)) = (way_of(t, nozzle), t.curve(nozzle.profile, Meaning::Profile, at))
         else {
             continue;
         };

@@ -8,6 +8,7 @@ use super::{
     switch::Switched,
 };
 use crate::{
+    fault::short,
     keyword::{condition::Target, prescribed::Meaning, problem::Problem},
     limits::MAX_CURVE_POINTS,
     log::Log,
@@ -182,13 +183,25 @@ impl<'p> Translation<'p> {
 
     /// The name of a curve of the deck, which is then written; as a velocity where it means something else.
     pub(super) fn curve(&mut self, id: u32, meaning: Meaning, at: Place) -> Option<Placed<String>> {
-        let points = self.points(id, at)?;
+        let given = self.points(id, at)?;
+        let offset = self.problem.curves.get(&id).map_or(0.0, |curve| curve.offset);
+        let points = &shifted(given, offset);
         let (name, points) = match meaning {
-            Meaning::Velocity => (format!("curve {id}"), points.to_vec()),
+            Meaning::Velocity => (format!("curve {id}"), points.clone()),
             Meaning::Displacement => (format!("rate of curve {id}"), rates(points)),
             Meaning::Acceleration => (format!("integral of curve {id}"), integrals(points)),
+            Meaning::Profile if points.len() > given.len() => (format!("profile {id}"), given.to_vec()),
+            Meaning::Profile => (format!("curve {id}"), given.to_vec()),
         };
         if !self.curves.contains_key(&name) {
+            let start = value_at_start(&shifted(given, offset));
+            if meaning == Meaning::Displacement && start != 0.0 {
+                let words = format!(
+                    "curve {id} of a displacement is {} at time 0: nodes move on from there, without that step",
+                    short(start)
+                );
+                self.log.warn(at, words);
+            }
             if points.len() > MAX_CURVE_POINTS {
                 let read = format!("{name} with {} points", points.len());
                 self.log.fault(at, read, format!("at most {MAX_CURVE_POINTS}"), "leave out some");
@@ -201,6 +214,29 @@ impl<'p> Translation<'p> {
             self.curves.insert(name.clone(), (at, points));
         }
         Some(made(name, at))
+    }
+}
+
+/// Points of a curve of time that was shifted to later times: before that LS-DYNA has 0.
+fn shifted(points: &[[f64; 2]], offset: f64) -> Vec<[f64; 2]> {
+    let mut list = points.to_vec();
+    let end = 0.999 * offset;
+    if offset > 0.0 && points[0][0] > end && points[0][1] != 0.0 {
+        list.splice(0..0, [[0.0, 0.0], [end, 0.0]]);
+    }
+    list
+}
+
+/// The value of a curve at time 0.
+fn value_at_start(points: &[[f64; 2]]) -> f64 {
+    let next = points.iter().position(|point| point[0] >= 0.0);
+    match next {
+        Some(0) => points[0][1],
+        Some(next) => {
+            let ([t, a], [end, b]) = (points[next - 1], points[next]);
+            a - t / (end - t) * (b - a)
+        }
+        None => points.last().map_or(0.0, |point| point[1]),
     }
 }
 
