@@ -2,12 +2,13 @@
 //!
 //! C. N. Kingery, G. Bulmash, Airblast parameters from TNT spherical air burst and hemispherical surface burst, ARBRL-TR-02555
 //! (1984): each quantity is `10^(sum of c_i U^i)`, `U = k0 + k1 log10 Z`, of the scaled distance `Z = R / W^(1/3)` in m/kg^(1/3), in kPa
-//! and ms (over `W^(1/3)`). Between arrival and the end of the positive phase, and after it, a pressure falls as
-//! `P (1 - s) e^(-b s)`, s the time since the arrival over the duration and b such that its positive phase has the impulse of the
-//! polynomial. On a face whose outward normal makes the angle a with the way to the charge it is
+//! and ms (over `W^(1/3)`). Between arrival and the end of the positive phase a pressure falls as
+//! `P (1 - s) e^(-b s)`, s the time since the arrival over the duration and b such that it has the impulse of the
+//! polynomial; what follows has curves of its own ([`Negative`]). On a face whose outward normal makes the angle a with the way to the charge it is
 //! `reflected cos^2 a + incident (1 + cos^2 a - 2 cos a)`, and `incident` on one that is turned away (G. Randers-Pehrson, K. A.
 //! Bannister, Airblast loading model for DYNA2D and DYNA3D, ARL-TR-1310, 1997).
 
+mod negative;
 mod tables;
 
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,7 @@ use crate::{
     },
     vectors::dot,
 };
+pub use negative::Negative;
 use tables::{AIR_BURST, SURFACE_BURST};
 
 /// How the charge lies.
@@ -51,8 +53,6 @@ pub struct Charge {
 
 /// Scaled distances in which the polynomials hold, ends included; those of durations begin later.
 const FARTHEST: f64 = 40.0;
-/// Below it no negative pressure falls: that of the air (kPa).
-const AIR: f64 = 101.325;
 
 /// One polynomial: k0, k1, and c from the constant on.
 struct Polynomial {
@@ -104,6 +104,8 @@ pub struct Wave {
     /// Peaks and impulses of the incident pressure and of that which is reflected straight back.
     pub peaks: [f64; 2],
     pub impulses: [f64; 2],
+    /// What follows.
+    pub negative: Negative,
 }
 
 impl Wave {
@@ -125,11 +127,15 @@ impl Wave {
                 root * reached(&table.incident_impulse, scaled, log),
                 root * table.reflected_impulse.at(log),
             ],
+            negative: Negative::at(burst, (scaled, log), root),
         }
     }
 
     /// Incident and reflected pressure at a time after the arrival.
     pub fn pressures(&self, since: f64) -> [f64; 2] {
+        if since >= self.duration {
+            return self.negative.pressures(since - self.duration);
+        }
         let s = since / self.duration;
         [0, 1].map(|i| {
             let decay = decay(self.impulses[i] / (self.peaks[i] * self.duration));
@@ -213,7 +219,7 @@ impl Charge {
         } else {
             incident
         };
-        pressure.max(-AIR) / kilopascals
+        pressure / kilopascals
     }
 }
 
@@ -343,12 +349,13 @@ mod tests {
         near(at(half, after), (0.25 * wave.peaks[1] + 0.25 * wave.peaks[0]) * 1e-6);
         assert_eq!(at([0.0, 0.0, 1.0], wave.arrival - 1e-9), 0.0);
         assert_eq!(at([0.0, 0.0, 1.0], wave.arrival + 1.01 * wave.duration), 0.0);
-        let sucking = charge(Burst::Surface, true).pressure(
-            [0.0; 3],
-            [0.0, 0.0, 1.0],
-            wave.arrival + 1.5 * wave.duration,
-        );
-        assert!((-AIR * 1e-6..0.0).contains(&sucking), "{sucking}");
+        let sucking = |normal: [f64; 3], share: f64| {
+            let time = wave.arrival + wave.duration + share * wave.negative.duration;
+            charge(Burst::Surface, true).pressure([0.0; 3], normal, time)
+        };
+        near(sucking([0.0, 0.0, 1.0], 1.0 / 3.0), -wave.negative.peak * 1e-6);
+        near(sucking([0.0, 0.0, -1.0], 1.0 / 3.0), -0.5 * wave.negative.peak * 1e-6);
+        assert_eq!((sucking([0.0, 0.0, 1.0], 1.001), sucking([0.0, 0.0, 1.0], 50.0)), (0.0, 0.0));
         let late = Charge { span: Span { from: 5.0, until: 9.0 }, ..ground };
         near(late.pressure([0.0; 3], [0.0, 0.0, 1.0], 5.0 + after), wave.peaks[1] * 1e-6);
         assert_eq!(late.pressure([0.0; 3], [0.0, 0.0, 1.0], 9.0), 0.0);
