@@ -4,6 +4,7 @@
 
 mod beams;
 mod bits;
+mod blasts;
 mod bodies;
 mod book;
 mod documents;

@@ -1,11 +1,14 @@
 //! What pushes bodies from outside.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use mechanics::load::{
-    Gravity, Loads, MAX_FORCES, NodalForce, Relaxation, SurfaceKind, SurfaceLoad,
-    blast::{Burst, Charge},
-    moving::{MovingPressure, Path},
+use mechanics::{
+    load::{
+        Gravity, Loads, MAX_FORCES, NodalForce, Relaxation, SurfaceKind, SurfaceLoad,
+        blast::{Burst, Charge},
+        moving::{MovingPressure, Path},
+    },
+    mesh::LOWER,
 };
 
 use super::{
@@ -17,9 +20,10 @@ use super::{
 use crate::{
     fault::short,
     log::Log,
+    place::Place,
     typed::{
         Deck,
-        condition::{self, Load, LoadKind},
+        condition::{self, Faces, Load, LoadKind, Side},
     },
 };
 
@@ -53,15 +57,18 @@ pub(super) fn make(
                     draft.list.surfaces.push(SurfaceLoad { kind: SurfaceKind::Pressure(pressure), faces });
                 }
             }
-            LoadKind::Blast { charge, faces } => {
+            LoadKind::Blast { charge, faces: asked } => {
                 let asking = Asking { at: load.at, title: &load.title, selected: &selected };
-                let faces = match faces {
+                let mut faces = match asked {
                     Some(faces) => region::faces(faces, &asking, parts, assembly, log),
                     None => Vec::new(),
                 };
                 if let Some(charge) =
-                    charge.as_ref().and_then(|c| exploding(c, load, &faces, deck, assembly, log))
+                    charge.as_ref().and_then(|c| exploding(c, load, &mut faces, deck, assembly, log))
                 {
+                    if let (Some(Faces::Segments(name)), Place::Card { .. }) = (asked, load.at) {
+                        warn_of_segments(&name.value, &charge, load, &faces, assembly, log);
+                    }
                     let kind = SurfaceKind::Blast(draft.list.charges.len() as u32);
                     draft.list.charges.push(charge);
                     draft.list.surfaces.push(SurfaceLoad { kind, faces });
@@ -106,29 +113,38 @@ pub(super) fn make(
     draft
 }
 
-/// A charge in the units of the deck; none where a face is nearer than its pressure is known.
+/// A charge in the units of the deck; none where a face is nearer than its pressure is known. The faces of shells become those of the side
+/// that it is to load.
 fn exploding(
     given: &condition::Charge,
     load: &Load,
-    faces: &[(u32, u8)],
+    faces: &mut [(u32, u8)],
     deck: &Deck,
     assembly: &Assembly,
     log: &Log<'_>,
 ) -> Option<Charge> {
     let (units, kilograms) = deck.units.in_air();
-    let condition::Charge { mass, point, span, burst, negative } = *given;
+    let condition::Charge { mass, point, span, burst, negative, side } = *given;
     let root = Charge::root(mass * kilograms);
     let mut charge = Charge { point, root, span, burst, negative, units, greatest: 0.0 };
     let mesh = &assembly.mesh;
     let offsets = mesh.element_offsets();
     let mut nearest = f64::MAX;
-    for &(element, side) in faces {
-        let p = offsets.partition_point(|&first| first <= element as usize) - 1;
+    for (element, face) in faces {
+        let p = offsets.partition_point(|&first| first <= *element as usize) - 1;
         let part = &mesh.parts[p];
-        let nodes = part.nodes_of(element as usize - offsets[p]);
-        let places = part.side(usize::from(side)).map(|c| mesh.positions[nodes[c] as usize]);
+        let nodes = part.nodes_of(*element as usize - offsets[p]);
+        let places = part.side(usize::from(*face)).map(|c| mesh.positions[nodes[c] as usize]);
         let centre = std::array::from_fn(|a| 0.25 * places.iter().map(|x| x[a]).sum::<f64>());
         nearest = nearest.min(charge.scaled_distance(centre));
+        let lower = match side {
+            Side::Facing => charge.is_behind(places),
+            Side::Upper => false,
+            Side::Lower => true,
+        };
+        if lower && part.section().is_some() {
+            *face = LOWER as u8;
+        }
     }
     if nearest < burst.nearest() {
         let kind = if burst == Burst::Air { "an air burst" } else { "a surface burst" };
@@ -143,6 +159,36 @@ fn exploding(
     // Faces that fly towards it may come twice as near.
     charge.greatest = charge.reflected_peak(0.5 * nearest);
     Some(charge)
+}
+
+/// Warns of segments of shells in a keyword deck whose normals look away from the charge: the side is not theirs.
+fn warn_of_segments(
+    name: &str,
+    charge: &Charge,
+    load: &Load,
+    faces: &[(u32, u8)],
+    assembly: &Assembly,
+    log: &Log<'_>,
+) {
+    let mesh = &assembly.mesh;
+    let offsets = mesh.element_offsets();
+    let key = |nodes: [u32; 4]| BTreeSet::from(nodes);
+    let of_shells = faces.iter().filter_map(|(element, side)| {
+        let p = offsets.partition_point(|&first| first <= *element as usize) - 1;
+        let part = &mesh.parts[p];
+        let nodes = part.nodes_of(*element as usize - offsets[p]);
+        part.section().map(|_| key(part.side(usize::from(*side)).map(|c| nodes[c])))
+    });
+    let of_shells: BTreeSet<BTreeSet<u32>> = of_shells.collect();
+    let behind = |nodes: &&[u32; 4]| charge.is_behind(nodes.map(|node| mesh.positions[node as usize]));
+    let segments = assembly.segments.get(name).into_iter().flatten();
+    let count = segments.filter(behind).filter(|nodes| of_shells.contains(&key(**nodes))).count();
+    if count > 0 {
+        log.warn(
+            load.at,
+            format!("{count} segments of shells look away from the charge: it loads the side that faces it"),
+        );
+    }
 }
 
 /// A pressure that moves; none after a fault.

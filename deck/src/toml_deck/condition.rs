@@ -15,7 +15,7 @@ use crate::{
     table::{Range, Table, Value},
     typed::condition::{
         Boundary, BoundaryKind, Charge, Components, Curve, Drive, Gravity, Load, LoadKind, Lumped, Parts,
-        Relaxation, Rigid, Wall, WallMotion, WallShape,
+        Relaxation, Rigid, Side, Wall, WallMotion, WallShape,
     },
 };
 
@@ -308,16 +308,17 @@ pub(super) fn read_loads(deck: &Table<'_>) -> Vec<Load> {
     loads
 }
 
-/// A charge: mass, point, burst, span and whether its negative phase acts.
+/// A charge: mass, point, burst, span, whether its negative phase acts and the side of shells that it loads.
 fn read_charge(table: &Table<'_>) -> Option<Charge> {
     const BURSTS: [&str; 2] = ["air", "surface"];
     let mass = table.number("mass", Range::Positive);
     let point = table.vector("point");
     let burst = table.require("burst", "one of air, surface").and_then(|v| v.one_of(&BURSTS));
     let negative = table.get("negative_phase").map_or(Some(true), |v| v.boolean());
+    let side = table.get("side").map_or(Some(0), |v| v.one_of(&Side::WORDS));
     let span = span(table);
     let burst = if burst? == 0 { Burst::Air } else { Burst::Surface };
-    Some(Charge { mass: mass?, point: point?, span, burst, negative: negative? })
+    Some(Charge { mass: mass?, point: point?, span, burst, negative: negative?, side: Side::ALL[side?] })
 }
 
 /// The curve under `curve` of a table, if it has one.

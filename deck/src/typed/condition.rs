@@ -227,6 +227,21 @@ pub(crate) enum LoadKind {
     },
 }
 
+/// The side of shells that a charge loads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// The one that faces it at the start; the upper one where it lies in their plane.
+    Facing,
+    Upper,
+    Lower,
+}
+
+impl Side {
+    pub(crate) const WORDS: [&str; 3] = ["facing", "upper", "lower"];
+    /// As [`Self::WORDS`].
+    pub(crate) const ALL: [Self; 3] = [Self::Facing, Self::Upper, Self::Lower];
+}
+
 /// A charge of TNT that explodes in air.
 #[derive(Clone, Debug)]
 pub(crate) struct Charge {
@@ -236,6 +251,7 @@ pub(crate) struct Charge {
     pub(crate) span: Span,
     pub(crate) burst: Burst,
     pub(crate) negative: bool,
+    pub(crate) side: Side,
 }
 
 /// A pressure by the distance from an axis that moves.

@@ -9,7 +9,7 @@ use crate::{
         Deck,
         condition::{
             Boundary, BoundaryKind, Components, Drive, Faces, Joint, Load, LoadKind, Moving, Parts, Path,
-            Region, Rigid, Wall, WallMotion, WallShape,
+            Region, Rigid, Side, Wall, WallMotion, WallShape,
         },
     },
 };
@@ -206,6 +206,8 @@ fn write_load(text: &mut Text, load: &Load) {
                 text.key("point", vector(charge.point));
                 text.key("burst", quoted(if charge.burst == Burst::Air { "air" } else { "surface" }));
                 text.some("negative_phase", Some(charge.negative).filter(|acts| !acts));
+                let side = Some(Side::WORDS[charge.side as usize]);
+                text.some("side", side.filter(|_| charge.side != Side::Facing));
                 for (key, time) in span(&charge.span) {
                     text.key(key, time);
                 }

@@ -12,7 +12,7 @@ pub use axes::{Guide, SolidAxes};
 pub use form::Form;
 pub use laminate::{Axis, Column, Laminate, LaminateError, MAX_LAYERS, Plies, Ply, first_without_direction};
 pub(crate) use sides::spread;
-pub use sides::{CORNERS, FACES, MAX_NODES, Nodes, Spacing, UPPER, quad_area, twice};
+pub use sides::{CORNERS, FACES, LOWER, MAX_NODES, Nodes, Spacing, UPPER, quad_area, twice};
 
 use crate::element::{
     beam2::BeamSection,

@@ -6,7 +6,7 @@ use super::state::Translation;
 use crate::{
     keyword::blast::Blasted,
     place::Place,
-    typed::condition::{Charge, Faces, Load, LoadKind, Parts, made},
+    typed::condition::{Charge, Faces, Load, LoadKind, Parts, Side, made},
 };
 
 /// Adds a load for each charge that segments feel.
@@ -43,6 +43,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
             span: charge.span,
             burst: charge.burst,
             negative: charge.negative,
+            side: Side::Facing,
         };
         let at: Place = charge.at;
         let faces = Some(Faces::Segments(made(name, at)));

@@ -19,7 +19,7 @@ use crate::{
         functions::{cbrt, exp, ln},
         scalar::Scalar,
     },
-    vectors::dot,
+    vectors::{cross, dot, minus},
 };
 pub use negative::Negative;
 use tables::{AIR_BURST, SURFACE_BURST};
@@ -53,6 +53,8 @@ pub struct Charge {
 
 /// Scaled distances in which the polynomials hold, ends included; those of durations begin later.
 const FARTHEST: f64 = 40.0;
+/// Cosine of the way to a charge and a normal up to which the charge lies in the plane of a face.
+const BESIDE: f64 = 1e-9;
 
 /// One polynomial: k0, k1, and c from the constant on.
 struct Polynomial {
@@ -191,6 +193,14 @@ impl Charge {
     pub fn scaled_distance(&self, x: [f64; 3]) -> f64 {
         let way: [f64; 3] = std::array::from_fn(|a| self.point[a] - x[a]);
         dot(way, way).sqrt() * self.units[0] / self.root
+    }
+
+    /// Whether it lies behind the face with these corners, not beside it: more than a rounding error below its plane.
+    pub fn is_behind(&self, corners: [[f64; 3]; 4]) -> bool {
+        let centre: [f64; 3] = std::array::from_fn(|a| 0.25 * corners.iter().map(|x| x[a]).sum::<f64>());
+        let normal = cross(minus(corners[2], corners[0]), minus(corners[3], corners[1]));
+        let way = minus(self.point, centre);
+        dot(way, normal) < -BESIDE * (dot(way, way) * dot(normal, normal)).sqrt()
     }
 
     /// The reflected peak at a scaled distance (stress).
@@ -332,6 +342,22 @@ mod tests {
         // 8 kg at 4 m in mm, ms, GPa.
         let (root, units) = (Charge::root(8.0), [1e-3, 1.0, 1e6]);
         Charge { point: [0.0, 0.0, 4000.0], root, span: Span::ALWAYS, burst, negative, units, greatest: 1.0 }
+    }
+
+    #[test]
+    fn a_charge_is_behind_a_face_unless_it_is_before_or_beside_it() {
+        let charge = charge(Burst::Air, true);
+        let square = [[0.0, 0.0], [1000.0, 0.0], [1000.0, 1000.0], [0.0, 1000.0]];
+        let behind = |x: [[f64; 3]; 4]| {
+            let turned = [x[0], x[3], x[2], x[1]];
+            [charge.is_behind(x), charge.is_behind(turned)]
+        };
+        let floor = |height: f64| square.map(|[x, y]| [x, y, height]);
+        assert_eq!([0.0, 8000.0].map(|z| behind(floor(z))), [[false, true], [true, false]]);
+        // In its plane, on a wall beside it, and on a face without area.
+        assert_eq!(behind(floor(4000.0)), [false; 2]);
+        assert_eq!(behind(square.map(|[x, z]| [x, 0.1 * x, 3000.0 + z])), [false; 2]);
+        assert_eq!(behind([[1.0; 3]; 4]), [false; 2]);
     }
 
     #[test]

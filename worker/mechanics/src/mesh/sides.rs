@@ -18,6 +18,8 @@ pub const FACES: [[usize; 4]; 6] =
 
 /// The side of a shell that stands for it, an index into [`FACES`].
 pub const UPPER: usize = 1;
+/// The other side of a shell.
+pub const LOWER: usize = 0;
 
 /// The corners of a shell as those of a hexahedron without height.
 pub fn twice([a, b, c, d]: [u32; 4]) -> [u32; 8] {
