@@ -71,11 +71,14 @@ impl Blasts {
         };
         let units = UNITS.iter().find(|(code, _)| *code == unit && (enhanced || unit < 5));
         if units.is_none() {
-            f.fault(
-                first + 5,
-                "UNIT 2 (SI), 4 (cm, g, us), 6 (mm, ms, kg) or 7 (mm, s, t)",
-                "convert the deck",
-            );
+            let (expected, advice) = match enhanced {
+                true => ("UNIT 2 (SI), 4 (cm, g, us), 6 (mm, ms, kg) or 7 (mm, s, t)", "convert the deck"),
+                false if unit == 6 || unit == 7 => {
+                    ("UNIT 2 (SI) or 4 (cm, g, us)", "use *LOAD_BLAST_ENHANCED, which has UNIT 6 and 7")
+                }
+                false => ("UNIT 2 (SI) or 4 (cm, g, us)", "convert the deck, or use *LOAD_BLAST_ENHANCED"),
+            };
+            f.fault(first + 5, expected, advice);
         }
         let burst = match f.integer(first + 6) {
             1 => Some(Burst::Surface),

@@ -72,6 +72,13 @@ fn what_has_no_curves_here_is_refused() {
     assert!(with(",7,1", ",7,4").contains("a hemisphere on the ground"));
     assert!(with(",7,1", ",3,1").contains("UNIT 2 (SI)"));
     assert!(with(",7,1", ",2,1").contains("give --units SI"));
+    let old = fault("*LOAD_BLAST\n8e-3,50.,50.,-2000.,0.0,7,1\n*LOAD_SEGMENT_SET\n5,-2\n");
+    assert!(
+        old.contains(
+            "expected UNIT 2 (SI) or 4 (cm, g, us); use *LOAD_BLAST_ENHANCED, which has UNIT 6 and 7"
+        ),
+        "{old}"
+    );
     assert!(with("8e-3", "0.0").contains("a mass of TNT above 0"));
     assert!(with("-2000.", "-10.").contains("a scaled distance of at least 0.0674 for a surface burst"));
 }
