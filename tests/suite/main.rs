@@ -32,6 +32,7 @@ mod tetrahedra;
 mod triangles;
 mod trusses;
 mod turning;
+mod welds;
 
 /// A row that nobody computes would look like one that holds.
 #[test]

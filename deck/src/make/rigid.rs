@@ -166,14 +166,14 @@ pub(super) fn make(
         if log.count() > 0 {
             continue;
         }
-        let mut make = |given: shape::Given| {
+        let make = |given: shape::Given| {
             shape::body(
                 &assembly.mesh,
                 materials,
                 (&conditions.constraints, &conditions.constraint),
                 &conditions.loads,
                 given,
-                &mut assembly.velocity,
+                (&assembly.velocity, &assembly.spin),
             )
         };
         let mut made = make(given.clone());
@@ -206,7 +206,7 @@ pub(super) fn make(
         }
         match made {
             Ok(body) => {
-                turn(assembly, &body);
+                start(assembly, &body);
                 bodies.push(body);
             }
             Err(words) => log.fault(
@@ -246,7 +246,7 @@ fn given_with_supports(
     conditions: &Conditions,
     acting: &dyn Fn(&Constraint) -> Constraint,
 ) -> Option<shape::Given> {
-    let reach = body.places.iter().flatten().fold(f64::MIN_POSITIVE, |reach, c| reach.max(c.abs()));
+    let reach = body.reach();
     let mut held = Held::default();
     for (&n, place) in body.nodes.iter().zip(&body.places) {
         let by = &acting(&conditions.constraints[conditions.constraint[n as usize] as usize]);
@@ -265,8 +265,11 @@ fn given_with_supports(
     Some(given)
 }
 
-/// Lets the nodes of a body turn at the start as it does; only those of shells ever use it.
-fn turn(assembly: &mut Assembly, body: &Body) {
+/// Lets the nodes of a body move and turn at the start as it does; only those of shells and beams ever use how they turn.
+fn start(assembly: &mut Assembly, body: &Body) {
+    for (&n, &place) in body.nodes.iter().zip(&body.places) {
+        assembly.velocity[n as usize] = body.start.velocity_at(place);
+    }
     let turns = assembly.mesh.parts.iter().any(|part| part.turns_nodes());
     if turns && (body.start.spin != [0.0; 3] || !assembly.spin.is_empty()) {
         assembly.spin.resize(assembly.velocity.len(), [0.0; 3]);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use mechanics::{
     contact::{edges::EDGE, reach},
     exact::Quantum,
+    rigid,
     vote::Vote,
     wall::{self, Pose},
 };
@@ -179,14 +180,32 @@ impl Account {
             (Limit::Volume, _) => "the rate of volume of an element".to_owned(),
             (Limit::Contact, _) => "the stiffness of contacts or transmitting faces".to_owned(),
             (Limit::Strike, _) => "the speed at which solids will strike a rigid wall".to_owned(),
-            (Limit::Turn, _) => "the angular velocity of a rigid body".to_owned(),
+            (Limit::Turn, _) => format!("the angular velocity of {}", self.fastest_body(problem)),
             (Limit::Travel, _) => "the travel of contact nodes, a share of the gap".to_owned(),
             (Limit::Growth, _) => "the growth from the step before".to_owned(),
             (Limit::End, _) => return,
         };
+        let advice = match limit {
+            Limit::Turn => "give it more nodes, or mass at them, or less spin",
+            _ => "coarsen or repair the mesh there, add an erosion strain",
+        };
         self.failure = Some(format!(
-            "time step {dt:e} at cycle {cycle}, at least {floor:e}; {why} holds it down; coarsen or repair the mesh there, add an erosion strain, or lower control.time_step_floor"
+            "time step {dt:e} at cycle {cycle}, at least {floor:e}; {why} holds it down; {advice}, or lower control.time_step_floor"
         ));
+    }
+
+    /// The rigid body that turns fastest, by a part and a node of it: it may have no name.
+    fn fastest_body(&self, problem: &Problem) -> String {
+        let model = &problem.model;
+        let speed = |state: &rigid::State| state.spin.iter().map(|w| w * w).sum::<f64>();
+        let states = self.run_totals.bodies.iter().zip(&model.setup.bodies);
+        let fastest = states.max_by(|(a, _), (b, _)| speed(a).total_cmp(&speed(b)));
+        let of = fastest.and_then(|(_, body)| {
+            let node = model.mesh.node_ids.get(*body.nodes.first()? as usize)?;
+            let part = model.mesh.parts.get(body.account as usize)?;
+            Some(format!("the rigid body with node {node}, of part `{}`", part.name))
+        });
+        of.unwrap_or_else(|| "a rigid body".to_owned())
     }
 
     pub(super) fn row(&mut self, actions: &mut Vec<Action>) {

@@ -249,8 +249,8 @@ fn lay_axes(
     Ok(())
 }
 
-/// The state of shells and beams at time zero. A node has the rotational inertia of a quarter of each of its elements, about any axis:
-/// `mass max(h^2 / 12, A / 8)`, so that bending and transverse shear never ask for a smaller step than the membrane; of beams it has the polar one of half of each.
+/// The state of shells and beams at time zero. A node has a quarter of the rotational inertia of each of its shells and half of that of
+/// each of its beams, see [`Part::gyration`].
 fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
     if !mesh.parts.iter().any(Part::turns_nodes) {
         return;
@@ -270,7 +270,8 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
                 for fibre in fields[beam2::ELEMENT..section.n_fields()].chunks_mut(beam2::FIBRE) {
                     fibre[beam2::TEMPERATURE][e] = material.initial_temperature();
                 }
-                inertia_of[e] = material.density * state.initial_volume[e] * section.polar();
+                let volume = state.initial_volume[e];
+                inertia_of[e] = material.density * volume * part.gyration(local, volume);
             }
         }
         let Topology::Shells { section, thicknesses, .. } = &part.topology else { continue };
@@ -282,9 +283,7 @@ fn shells(mesh: &Mesh, setup: &Setup, state: &mut GlobalState) {
                 layer[shell4::LAYER - 1][e] = material.initial_temperature();
             }
             let volume = state.initial_volume[e];
-            let area = volume / thickness;
-            let radius2 = (thickness * thickness / 12.0).max(area / 8.0);
-            inertia_of[e] = material.density * volume * radius2;
+            inertia_of[e] = material.density * volume * part.gyration(local, volume);
         }
     }
     let largest = inertia_of.iter().copied().fold(f64::MIN_POSITIVE, f64::max);

@@ -284,6 +284,20 @@ impl Part {
         matches!(self.topology, Topology::Shells { .. } | Topology::Beams { .. })
     }
 
+    /// Rotational inertia over mass that element `e` of this volume gives its nodes, about any axis (length squared): of a shell
+    /// `max(h^2 / 12, A / 8)`, so that bending and transverse shear never ask for a smaller step than the membrane; of a beam the polar one;
+    /// none of kinds that do not turn their nodes.
+    pub fn gyration(&self, e: usize, volume: f64) -> f64 {
+        match &self.topology {
+            Topology::Shells { section, thicknesses, .. } => {
+                let thickness = section.thickness_of(thicknesses, e);
+                (thickness * thickness / 12.0).max(volume / thickness / 8.0)
+            }
+            Topology::Beams { section, .. } => section.polar(),
+            _ => 0.0,
+        }
+    }
+
     /// Initial thickness of element `e`, of a kind that has a thickness and no height (length).
     pub fn thickness_of(&self, e: usize) -> Option<f64> {
         match &self.topology {

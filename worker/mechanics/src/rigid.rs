@@ -46,7 +46,7 @@ pub struct Body {
     pub places: Vec<[f64; 3]>,
     /// What its nodes weigh over what its elements say: 1 unless the deck gives the mass.
     pub nodal_scale: f64,
-    /// The quantum of arms: `2^-50` of the longest.
+    /// The quantum of arms: `2^-50` of the longest, or of what the inertia that its nodes have of their own is as an arm if that is longer.
     pub length: Quantum,
     /// Least Courant limit of its elements at rest (time) and the global index of the element that has it: of a body of a
     /// problem in which nothing deforms; else none.
@@ -93,6 +93,12 @@ impl State {
     /// From the centre to a place of the body.
     pub fn arm(&self, place: [f64; 3]) -> [f64; 3] {
         turned(&self.attitude, place)
+    }
+
+    /// How fast a place of the body moves.
+    pub fn velocity_at(&self, place: [f64; 3]) -> [f64; 3] {
+        let turning = cross(self.spin, self.arm(place));
+        std::array::from_fn(|a| self.velocity[a] + turning[a])
     }
 
     /// Where a place of the body is now.
@@ -369,7 +375,7 @@ impl Advance<'_> {
 const ROUNDS: usize = 30;
 
 impl Body {
-    /// At least the longest arm of its nodes, and less than four times that (length).
+    /// At least the longest arm of its nodes, and less than four times that or what stands for it, see [`Body::length`] (length).
     pub fn reach(&self) -> f64 {
         self.length.value() * (1_u64 << 50) as f64
     }

@@ -84,10 +84,9 @@ pub(in crate::make) fn make_switches(
             continue;
         }
         let alone = shape::Given { parts: Vec::new(), nodes: nodes.clone(), ..given.clone() };
-        let mut velocity = assembly.velocity.clone();
+        let motion = (assembly.velocity.as_slice(), assembly.spin.as_slice());
         let held_by = (conditions.constraints.as_slice(), conditions.constraint.as_slice());
-        let made =
-            shape::body(&assembly.mesh, materials, held_by, &conditions.loads, alone.clone(), &mut velocity);
+        let made = shape::body(&assembly.mesh, materials, held_by, &conditions.loads, alone.clone(), motion);
         let body = match made {
             Ok(body) => body,
             Err(words) => {

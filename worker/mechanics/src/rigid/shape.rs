@@ -19,6 +19,73 @@ use crate::{
     vectors::{cross, dot, minus},
 };
 
+/// A node of a body, as it moves before it is one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Node {
+    pub(super) mass: f64,
+    /// Rotational inertia of its own, from the shells and beams that deform at it: these turn the body by their moments.
+    pub(super) inertia: f64,
+    pub(super) x: [f64; 3],
+    pub(super) v: [f64; 3],
+    /// Its rotation rate (1/time).
+    pub(super) spin: [f64; 3],
+}
+
+/// Nodes as one: what they weigh, and the rigid motion that has their momentum and angular momentum.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Whole {
+    pub(super) mass: f64,
+    pub(super) centre: [f64; 3],
+    /// About the centre, that of the nodes' own included.
+    pub(super) inertia: [f64; 6],
+    /// What of the inertia is the nodes' own, over the mass (length squared).
+    pub(super) own: f64,
+    /// Velocity of the centre.
+    pub(super) velocity: [f64; 3],
+    pub(super) spin: [f64; 3],
+    /// Kinetic energy of the nodes, before they are one.
+    pub(super) kinetic: f64,
+}
+
+impl Whole {
+    pub(super) fn of(nodes: &[Node]) -> Self {
+        let mut moments = Moments::default();
+        nodes.iter().for_each(|node| moments.add_node(node.mass, node));
+        let (centre, inertia) = moments.central();
+        let beside = nodes.first().map_or([0.0; 3], |node| node.v);
+        let (mut momentum, mut angular, mut own, mut kinetic) = ([0.0; 3], [0.0; 3], 0.0, 0.0);
+        for node in nodes {
+            // Beside the first node: what all have is no rounded sum.
+            let carried = minus(node.v, beside).map(|v| node.mass * v);
+            let moment = cross(minus(node.x, centre), carried);
+            for a in 0..3 {
+                momentum[a] += carried[a];
+                angular[a] += node.inertia.mul_add(node.spin[a], moment[a]);
+            }
+            own += node.inertia;
+            kinetic += 0.5 * node.mass.mul_add(dot(node.v, node.v), node.inertia * dot(node.spin, node.spin));
+        }
+        let mut turned = inertia;
+        widen(&mut turned);
+        Self {
+            mass: moments.mass,
+            centre,
+            inertia,
+            own: own / moments.mass,
+            velocity: std::array::from_fn(|a| beside[a] + momentum[a] / moments.mass),
+            spin: super::solve(full(&turned), angular),
+            kinetic,
+        }
+    }
+
+    /// The quantum of arms of a body whose nodes are at these places from its centre: of one so small that its nodes' own inertia is
+    /// most of it, by what that is as an arm.
+    pub(super) fn length(&self, places: &[[f64; 3]]) -> Quantum {
+        let radius = places.iter().flatten().fold(self.own.sqrt(), |r, c| r.max(c.abs()));
+        Quantum::for_reference(2.0 * radius, 50)
+    }
+}
+
 /// What a deck says of a body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Given {
@@ -51,27 +118,28 @@ impl Given {
     }
 }
 
-/// Inertia that nodes on one line or in one point are given about the axes that they have none about, over the largest that they have:
-/// what pushes them has no moment about these.
+/// Inertia that nodes on one line are given about it, over the largest that they have, where nothing turns them about it: what pushes nodes
+/// of solids, trusses and springs has no moment about that line, and those of shells and beams have a rotational inertia of their own.
 const LINE_INERTIA: f64 = 1e-6;
 
 /// Least share of the inertia of its nodes that a body may have: contact finds its time step by the masses of nodes.
 const LEAST_INERTIA: f64 = 0.1;
 
-/// Makes a body: its nodes move from then on as `velocity` (by global node) is left here.
+/// Makes a body of nodes that move and turn as `velocity` and `spin` say (by global node; none turns where `spin` is empty).
 ///
-/// Elements of other parts that share nodes with it hang an eighth of their mass on each. The motion at the start is that
-/// of the nodes: the same for all of them, or the rigid motion of the same momentum and angular momentum.
+/// Elements of other parts that share nodes with it hang an eighth of their mass on each; shells and beams the rotational inertia,
+/// too, that they give their nodes. The motion at the start is that of the nodes: the same for all of them, or the rigid
+/// motion of the same momentum and angular momentum.
 ///
 /// # Errors
-/// If it has no mass, or the inertia is none that a body can have: of nodes alone, if they are in one point.
+/// If it has no mass, or the inertia is none that a body can have: of nodes of solids alone, if they are in one point.
 pub fn body(
     mesh: &Mesh,
     materials: &[Material],
     constraints: (&[Constraint], &[u16]),
     loads: &Loads,
     given: Given,
-    velocity: &mut [[f64; 3]],
+    (velocity, spin): (&[[f64; 3]], &[[f64; 3]]),
 ) -> Result<Body, String> {
     let curves = &loads.curves;
     let nodes = given.all_nodes(mesh);
@@ -79,8 +147,8 @@ pub fn body(
     let mut account = given.parts.first().copied();
     let first = nodes.first().map_or([0.0; 3], |&n| mesh.positions[n as usize]);
     let mut own = Moments::default();
-    // Mass of each node: that of the body's elements, and what hangs on it.
-    let mut nodal = vec![[0.0; 2]; nodes.len()];
+    // Mass of each node, that of the body's elements and what hangs on it, and the rotational inertia that hangs on it.
+    let mut nodal = vec![[0.0; 3]; nodes.len()];
     for (p, part) in (0..).zip(&mesh.parts) {
         let inside = given.parts.binary_search(&p).is_ok();
         let density = materials[part.material as usize].density;
@@ -97,9 +165,13 @@ pub fn body(
             if inside {
                 own.add_element(part, e, &|n| minus(mesh.positions[n as usize], first), density);
             }
-            let mass = density * part.volume_of(e, &mesh.positions);
+            let volume = part.volume_of(e, &mesh.positions);
+            let mass = density * volume;
             for (place, share) in places {
                 nodal[place][usize::from(!inside)] += mass * share;
+                if !inside {
+                    nodal[place][2] += mass * part.gyration(e, volume) * share;
+                }
             }
         }
     }
@@ -108,7 +180,7 @@ pub fn body(
             nodal[place][1] += mass;
         }
     }
-    let heavy = own.mass > 0.0 || is_of_nodes && nodal.iter().any(|[_, hung]| *hung > 0.0);
+    let heavy = own.mass > 0.0 || is_of_nodes && nodal.iter().any(|[_, hung, _]| *hung > 0.0);
     if !(heavy && own.mass.is_finite()) {
         return Err(format!("mass {:e} of its elements, must be positive", own.mass));
     }
@@ -117,27 +189,36 @@ pub fn body(
     if let Some((centre, inertia)) = &given.inertia {
         all = Moments::about(all.mass, minus(*centre, first), inertia);
     }
-    for (&n, [_, hung]) in nodes.iter().zip(&nodal) {
-        all.add(*hung, minus(mesh.positions[n as usize], first));
-    }
-    let (centre, mut inertia) = all.central();
-    let centre: [f64; 3] = std::array::from_fn(|a| first[a] + centre[a]);
+    let alone = |(&n, &[inside, hung, inertia]): (&u32, &[f64; 3])| {
+        let n = n as usize;
+        let turning = spin.get(n).copied().unwrap_or_default();
+        let x = minus(mesh.positions[n], first);
+        Node { mass: scale.mul_add(inside, hung), inertia, x, v: velocity[n], spin: turning }
+    };
+    let alone: Vec<Node> = nodes.iter().zip(&nodal).map(alone).collect();
+    alone.iter().zip(&nodal).for_each(|(node, [_, hung, _])| all.add_node(*hung, node));
+    let (from_first, mut inertia) = all.central();
+    let centre: [f64; 3] = std::array::from_fn(|a| first[a] + from_first[a]);
     let places: Vec<[f64; 3]> = nodes.iter().map(|&n| minus(mesh.positions[n as usize], centre)).collect();
-    let mass_of = |i: usize| scale * nodal[i][0] + nodal[i][1];
-    let mut lumped = Moments::default();
-    (0..nodes.len()).for_each(|i| lumped.add(mass_of(i), places[i]));
-    let lumped_inertia = lumped.inertia();
+    let whole = Whole::of(&alone);
     if is_of_nodes {
         widen(&mut inertia);
     }
-    let spare: [f64; 6] = std::array::from_fn(|i| inertia[i] - LEAST_INERTIA * lumped_inertia[i]);
+    // The centre of the nodes' masses is not that of the body where a deck gives another, and for distorted elements not quite.
+    let beside = minus(from_first, whole.centre);
+    let mut moved = Moments::default();
+    moved.add(whole.mass, beside);
+    let moved = moved.inertia();
+    let of_nodes: [f64; 6] = std::array::from_fn(|i| whole.inertia[i] + moved[i]);
+    let spare: [f64; 6] = std::array::from_fn(|i| inertia[i] - LEAST_INERTIA * of_nodes[i]);
     if !is_positive(&inertia) || !is_positive(&spare) {
         return Err(format!(
-            "inertia {inertia:?} about the centre of mass, its nodes have {lumped_inertia:?}; it must be positive and about no axis less than a tenth of theirs"
+            "inertia {inertia:?} about the centre of mass, its nodes have {of_nodes:?}; it must be positive and about no axis less than a tenth of theirs"
         ));
     }
-    let (mut speed, mut spin) = motion(&nodes, &places, &mass_of, &lumped, velocity);
-    spin = given.start_spin.unwrap_or(spin);
+    let offset = cross(whole.spin, beside);
+    let mut speed: [f64; 3] = std::array::from_fn(|a| whole.velocity[a] + offset[a]);
+    let mut spin = given.start_spin.unwrap_or(whole.spin);
     for axis in 0..3 {
         let now = |drive: Option<Drive>| drive?.prescribed(curves, 0.0);
         speed[axis] = now(given.velocity[axis]).unwrap_or(speed[axis]);
@@ -153,14 +234,10 @@ pub fn body(
             }
         }
     }
-    for (&n, &place) in nodes.iter().zip(&places) {
-        let turning = cross(spin, place);
-        velocity[n as usize] = std::array::from_fn(|a| speed[a] + turning[a]);
-    }
-    let radius = places.iter().flatten().fold(0.0_f64, |r, c| r.max(c.abs()));
     let (constraints, of_node) = constraints;
     let constraint: Vec<u16> = nodes.iter().map(|&n| of_node[n as usize]).collect();
-    let masses = [lumped.mass, all.mass];
+    let mass_of = |i: usize| alone[i].mass;
+    let masses = [whole.mass, all.mass];
     let (forces, pulls) = forces_on((constraints, &constraint), loads, &places, &mass_of, masses);
     Ok(Body {
         parts: given.parts,
@@ -172,19 +249,23 @@ pub fn body(
         spin: given.spin,
         circle: given.circle,
         nodes,
-        places,
         nodal_scale: scale,
-        length: Quantum::for_reference(2.0 * radius, 50),
+        length: whole.length(&places),
+        places,
         courant: None,
         forces,
         pulls,
     })
 }
 
-/// Gives nodes on a line inertia about it.
+/// Gives nodes on a line that have hardly any inertia about it some; leaves that of others.
 pub(super) fn widen(inertia: &mut [f64; 6]) {
-    let largest = inertia[0].max(inertia[1]).max(inertia[2]);
-    (0..3).for_each(|a| inertia[a] += LINE_INERTIA * largest);
+    let least = LINE_INERTIA * inertia[0].max(inertia[1]).max(inertia[2]);
+    let mut rest = *inertia;
+    (0..3).for_each(|a| rest[a] -= least);
+    if !is_positive(&rest) {
+        (0..3).for_each(|a| inertia[a] += least);
+    }
 }
 
 /// The nodal forces on a body whose nodes at `places` have these constraints, and its forces by mass. `masses` are those of its nodes and
@@ -266,38 +347,10 @@ pub(super) fn starting(inertia: &[f64; 6], centre: [f64; 3], velocity: [f64; 3],
     State { centre, velocity, attitude: [1.0, 0.0, 0.0, 0.0], momentum, spin }
 }
 
-/// Velocity of the centre and angular velocity of nodes that move as they do at the start.
-fn motion(
-    nodes: &[u32],
-    places: &[[f64; 3]],
-    mass_of: &dyn Fn(usize) -> f64,
-    lumped: &Moments,
-    velocity: &[[f64; 3]],
-) -> ([f64; 3], [f64; 3]) {
-    let first = nodes.first().map_or([0.0; 3], |&n| velocity[n as usize]);
-    if nodes.iter().all(|&n| velocity[n as usize] == first) {
-        return (first, [0.0; 3]);
-    }
-    // About the centre of the nodes' masses, which for distorted elements is not quite that of the body.
-    let (centre, inertia) = lumped.central();
-    let (mut momentum, mut angular) = ([0.0; 3], [0.0; 3]);
-    for (i, (&n, &place)) in nodes.iter().zip(places).enumerate() {
-        let carried = velocity[n as usize].map(|v| mass_of(i) * v);
-        let moment = cross(minus(place, centre), carried);
-        for a in 0..3 {
-            momentum[a] += carried[a];
-            angular[a] += moment[a];
-        }
-    }
-    let spin = super::solve(full(&inertia), angular);
-    let offset = cross(spin, centre);
-    (std::array::from_fn(|a| momentum[a] / lumped.mass - offset[a]), spin)
-}
-
 /// Mass, first moments and second moments xx, yy, zz, xy, yz, zx.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Moments {
-    pub(super) mass: f64,
+struct Moments {
+    mass: f64,
     first: [f64; 3],
     second: [f64; 6],
 }
@@ -306,12 +359,18 @@ pub(super) struct Moments {
 const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [2, 0]];
 
 impl Moments {
-    pub(super) fn add(&mut self, mass: f64, x: [f64; 3]) {
+    fn add(&mut self, mass: f64, x: [f64; 3]) {
         self.mass += mass;
         (0..3).for_each(|a| self.first[a] += mass * x[a]);
         for (sum, [a, b]) in self.second.iter_mut().zip(PAIRS) {
             *sum += mass * x[a] * x[b];
         }
+    }
+
+    /// Adds a node of this mass, and its own inertia.
+    fn add_node(&mut self, mass: f64, node: &Node) {
+        self.add(mass, node.x);
+        (0..3).for_each(|a| self.second[a] += 0.5 * node.inertia);
     }
 
     /// Adds element `e` of a part, whose nodes stand where `at` says.
@@ -438,7 +497,7 @@ impl Moments {
     }
 
     /// Centre and inertia about it.
-    pub(super) fn central(&self) -> ([f64; 3], [f64; 6]) {
+    fn central(&self) -> ([f64; 3], [f64; 6]) {
         let centre = self.first.map(|c| c / self.mass);
         let mut moved = *self;
         for (sum, [a, b]) in moved.second.iter_mut().zip(PAIRS) {

@@ -11,9 +11,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Body, State, full,
-    shape::{Moments, forces_on, is_positive, starting, widen},
-    solve,
+    Body, State,
+    shape::{Node, Whole, forces_on, is_positive, starting, widen},
 };
 use crate::{
     exact::Quantum,
@@ -21,7 +20,7 @@ use crate::{
     mesh::Mesh,
     setup::Setup,
     state::GlobalState,
-    vectors::{cross, dot, minus},
+    vectors::{dot, minus},
     wall::{self, Pose},
 };
 
@@ -231,25 +230,17 @@ fn form(
         return Ok((Formed { switch: index, body, constraint: Vec::new() }, 0.0));
     };
     let first = state.x[first as usize];
-    let from_first = |n: u32| minus(state.x[n as usize], first);
-    let mut all = Moments::default();
-    nodes.iter().for_each(|&n| all.add(state.mass[n as usize], from_first(n)));
-    let (centre, mut inertia) = all.central();
-    let places: Vec<[f64; 3]> = nodes.iter().map(|&n| minus(from_first(n), centre)).collect();
-    let (mut momentum, mut angular, mut kinetic) = ([0.0; 3], [0.0; 3], 0.0);
-    for (&n, &place) in nodes.iter().zip(&places) {
-        let (mass, v) = (state.mass[n as usize], state.v[n as usize]);
+    let shells = &state.shells;
+    let alone = |&n: &u32| {
+        let n = n as usize;
         // Nodes of shells and beams turn by themselves.
-        let own = state.shells.inertia.get(n as usize).copied().unwrap_or_default();
-        let spin = if own > 0.0 { state.shells.spin[n as usize] } else { [0.0; 3] };
-        let moment = cross(place, v);
-        for a in 0..3 {
-            momentum[a] += mass * v[a];
-            angular[a] += mass.mul_add(moment[a], own * spin[a]);
-            inertia[a] += own;
-        }
-        kinetic += 0.5 * mass.mul_add(dot(v, v), own * dot(spin, spin));
-    }
+        let inertia = shells.inertia.get(n).copied().unwrap_or_default();
+        let spin = if inertia > 0.0 { shells.spin[n] } else { [0.0; 3] };
+        Node { mass: state.mass[n], inertia, x: minus(state.x[n], first), v: state.v[n], spin }
+    };
+    let alone: Vec<Node> = nodes.iter().map(alone).collect();
+    let whole = Whole::of(&alone);
+    let mut inertia = whole.inertia;
     widen(&mut inertia);
     if !is_positive(&inertia) {
         return Err(format!(
@@ -257,28 +248,25 @@ fn form(
             mesh.parts[switch.parts[0] as usize].name, state.time
         ));
     }
-    let speed = momentum.map(|p| p / all.mass);
-    let spin = solve(full(&inertia), angular);
-    let centre: [f64; 3] = std::array::from_fn(|a| first[a] + centre[a]);
-    let start = starting(&inertia, centre, speed, spin);
+    let places: Vec<[f64; 3]> = alone.iter().map(|node| minus(node.x, whole.centre)).collect();
+    let centre: [f64; 3] = std::array::from_fn(|a| first[a] + whole.centre[a]);
+    let start = starting(&inertia, centre, whole.velocity, whole.spin);
     let constraint: Vec<u16> = nodes.iter().map(|&n| state.constraint[n as usize]).collect();
-    let mass_of = |i: usize| state.mass[nodes[i] as usize];
+    let mass_of = |i: usize| alone[i].mass;
     let constraints = (setup.constraints.as_slice(), constraint.as_slice());
-    let (forces, pulls) = forces_on(constraints, &setup.loads, &places, &mass_of, [all.mass; 2]);
-    for (&n, &place) in nodes.iter().zip(&places) {
+    let (forces, pulls) = forces_on(constraints, &setup.loads, &places, &mass_of, [whole.mass; 2]);
+    for ((&n, &place), node) in nodes.iter().zip(&places).zip(&alone) {
         let n = n as usize;
-        let turned = cross(spin, place);
-        state.v[n] = std::array::from_fn(|a| speed[a] + turned[a]);
-        if state.shells.inertia.get(n).is_some_and(|inertia| *inertia > 0.0) {
-            state.shells.spin[n] = spin;
+        state.v[n] = start.velocity_at(place);
+        if node.inertia > 0.0 {
+            state.shells.spin[n] = start.spin;
         }
         state.constraint[n] = 0;
     }
-    let radius = places.iter().flatten().fold(0.0_f64, |r, c| r.max(c.abs()));
-    let length = Quantum::for_reference(2.0 * radius, 50);
-    let body = Body { mass: all.mass, inertia, start, nodes, places, length, forces, pulls, ..body };
-    let kept = 0.5 * all.mass.mul_add(dot(speed, speed), dot(spin, start.momentum));
-    Ok((Formed { switch: index, body, constraint }, kinetic - kept))
+    let length = whole.length(&places);
+    let kept = 0.5 * whole.mass.mul_add(dot(start.velocity, start.velocity), dot(start.spin, start.momentum));
+    let body = Body { mass: whole.mass, inertia, start, nodes, places, length, forces, pulls, ..body };
+    Ok((Formed { switch: index, body, constraint }, whole.kinetic - kept))
 }
 
 /// Nodes of the elements of these parts that have not eroded, ascending.

@@ -39,15 +39,19 @@ fn brick(low: [f64; 3], size: [f64; 3], shape: impl Fn([f64; 3]) -> [f64; 3]) ->
     }
 }
 
-fn made(mesh: &Mesh, given: shape::Given, velocity: &mut [[f64; 3]]) -> Result<Body, String> {
+fn made(mesh: &Mesh, given: shape::Given, velocity: &[[f64; 3]]) -> Result<Body, String> {
+    made_of(mesh, given, (velocity, &[]))
+}
+
+fn made_of(mesh: &Mesh, given: shape::Given, motion: (&[[f64; 3]], &[[f64; 3]])) -> Result<Body, String> {
     let of_node = vec![0; mesh.n_nodes()];
-    shape::body(mesh, &[steel()], (&[Constraint::default()], &of_node), &Loads::default(), given, velocity)
+    shape::body(mesh, &[steel()], (&[Constraint::default()], &of_node), &Loads::default(), given, motion)
 }
 
 fn spinning(size: [f64; 3], spin: [f64; 3]) -> Body {
     let mesh = brick([1.0, -2.0, 0.5], size, |x| x);
     let given = shape::Given { parts: vec![0], start_spin: Some(spin), ..shape::Given::default() };
-    made(&mesh, given, &mut [[0.0; 3]; 8]).expect("a body")
+    made(&mesh, given, &[[0.0; 3]; 8]).expect("a body")
 }
 
 fn advance(loads: &Loads, time: f64, dt: f64) -> Advance<'_> {
@@ -91,7 +95,7 @@ fn a_frustum_has_the_moments_of_its_integrals() {
     let mesh =
         brick([-1.0, -1.0, 0.0], [2.0, 2.0, 1.0], |[x, y, z]| [x * (1.0 - 0.5 * z), y * (1.0 - 0.5 * z), z]);
     let given = shape::Given { parts: vec![0], ..shape::Given::default() };
-    let body = made(&mesh, given, &mut [[0.0; 3]; 8]).expect("a body");
+    let body = made(&mesh, given, &[[0.0; 3]; 8]).expect("a body");
     let mass = 8000.0 * 7.0 / 3.0;
     assert!((body.mass / mass - 1.0).abs() < 1e-14, "{}", body.mass);
     assert!((body.start.centre[2] - 11.0 / 28.0).abs() < 1e-14, "{:?}", body.start.centre);
@@ -135,7 +139,7 @@ fn a_tube_of_shells_has_its_mass_its_centre_and_its_inertia_with_its_thickness()
     let (radius, length, thickness) = (0.4, 1.0, 0.2);
     let mesh = tube(radius, length, thickness, 120);
     let given = shape::Given { parts: vec![0], ..shape::Given::default() };
-    let body = made(&mesh, given, &mut vec![[0.0; 3]; mesh.n_nodes()]).expect("a body");
+    let body = made(&mesh, given, &vec![[0.0; 3]; mesh.n_nodes()]).expect("a body");
     let mass = 8000.0 * std::f64::consts::TAU * radius * length * thickness;
     // Facets are inside the circle: by 1 - pi^2 / 6 n^2 in length, and twice that more in the square of the radius.
     assert!((body.mass / mass - 1.0).abs() < 2e-4, "{} of {mass}", body.mass);
@@ -149,7 +153,7 @@ fn a_tube_of_shells_has_its_mass_its_centre_and_its_inertia_with_its_thickness()
     let thin = made(
         &tube(radius, length, 1e-3, 120),
         shape::Given { parts: vec![0], ..shape::Given::default() },
-        &mut vec![[0.0; 3]; mesh.n_nodes()],
+        &vec![[0.0; 3]; mesh.n_nodes()],
     )
     .expect("a body");
     // Without its thickness it would be 2 % less.
@@ -178,10 +182,10 @@ fn the_rigid_part_of_the_motion_of_the_nodes_is_taken_up() {
     let mesh = brick([1.0, -2.0, 0.5], [0.2, 0.3, 0.5], |[x, y, z]| [x + 0.1 * y * z, y, z]);
     let (v, spin) = ([3.0, -1.0, 2.0], [10.0, 20.0, -5.0]);
     let given = shape::Given { parts: vec![0], ..shape::Given::default() };
-    let still = made(&mesh, given.clone(), &mut [[0.0; 3]; 8]).expect("a body");
+    let still = made(&mesh, given.clone(), &[[0.0; 3]; 8]).expect("a body");
     let mut velocity = still.places.iter().map(|&r| cross(spin, r)).collect::<Vec<_>>();
     velocity.iter_mut().for_each(|at| (0..3).for_each(|a| at[a] += v[a]));
-    let body = made(&mesh, given, &mut velocity).expect("a body");
+    let body = made(&mesh, given, &velocity).expect("a body");
     for a in 0..3 {
         assert!((body.start.velocity[a] - v[a]).abs() < 1e-12, "{:?}", body.start);
         assert!((body.start.spin[a] - spin[a]).abs() < 1e-11, "{:?}", body.start);
@@ -197,11 +201,11 @@ fn what_is_given_stands_and_too_little_inertia_is_refused() {
         inertia: Some(([0.5, 0.5, 0.6], [inertia, inertia, inertia, 0.0, 0.0, 0.0])),
         ..shape::Given::default()
     };
-    let body = made(&mesh, given(5000.0), &mut [[0.0; 3]; 8]).expect("a body");
+    let body = made(&mesh, given(5000.0), &[[0.0; 3]; 8]).expect("a body");
     assert_eq!((body.mass, body.start.centre), (16_000.0, [0.5, 0.5, 0.6]));
     assert!((body.nodal_scale - 2.0).abs() < 1e-14, "{}", body.nodal_scale);
     assert!((body.inertia[1] - 5000.0).abs() < 1e-9, "{:?}", body.inertia);
-    let error = made(&mesh, given(500.0), &mut [[0.0; 3]; 8]).expect_err("too little");
+    let error = made(&mesh, given(500.0), &[[0.0; 3]; 8]).expect_err("too little");
     assert!(error.contains("less than a tenth"), "{error}");
 }
 
@@ -335,4 +339,109 @@ fn a_turn_by_a_large_angle_is_that_of_its_sine() {
         assert!((q[2] - (0.5 * angle).sin()).abs() < 1e-14, "{angle}: {q:?}");
         assert!((q[0] - (0.5 * angle).cos()).abs() < 1e-14, "{angle}: {q:?}");
     }
+}
+
+/// Two bricks whose low corners are at the origin and at `low`, of eight nodes each.
+fn two_bricks(low: [f64; 3]) -> Mesh {
+    let (mut mesh, mut upper) = (brick([0.0; 3], [1.0; 3], |x| x), brick(low, [1.0; 3], |x| x));
+    mesh.positions.append(&mut upper.positions);
+    mesh.node_ids = (1..17).collect();
+    mesh.parts.extend(upper.parts.pop().map(|part| Part { nodes: (8..16).collect(), ..part }));
+    mesh
+}
+
+#[test]
+fn nodes_on_a_line_of_solids_take_up_their_momenta_and_do_not_turn_about_it() {
+    // From a corner of the one to a corner of the other: along z, and oblique.
+    for low in [[1.0, 1.0, 1.5], [1.3, 0.8, 1.4]] {
+        let mesh = two_bricks(low);
+        let mut velocity = vec![[0.0; 3]; 16];
+        velocity[8..].fill([2.0, 3.0, 10.0]);
+        let given = shape::Given { nodes: vec![7, 8], ..shape::Given::default() };
+        let body = made(&mesh, given, &velocity).expect("a body");
+        assert!(body.start.is_finite(), "{:?}", body.start);
+        // An eighth of a tonne of steel each.
+        let (mass, arm) = (1000.0, [0, 1, 2].map(|a| mesh.positions[8][a] - mesh.positions[7][a]));
+        let carried = velocity[8].map(|v| mass * v);
+        let angular = cross(arm.map(|c| 0.5 * c), carried);
+        for a in 0..3 {
+            assert!((body.mass * body.start.velocity[a] - carried[a]).abs() < 1e-9, "{:?}", body.start);
+            assert!((body.start.momentum[a] - angular[a]).abs() < 1e-6, "{:?} {angular:?}", body.start);
+        }
+        let about = dot(body.start.spin, arm) / dot(arm, arm).sqrt();
+        assert!(about.abs() < 1e-8, "{about} about the line of {:?}", body.start.spin);
+    }
+}
+
+/// Squares of one shell each, with sides of 0.2 m and so thick, in planes z = 0, `gap`, ...: parts of four nodes.
+fn squares(n: u32, gap: f64, thickness: f64) -> Mesh {
+    let corners = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.2], [0.0, 0.2]];
+    let part = |i: u32| Part {
+        name: format!("square {i}"),
+        material: 0,
+        topology: Topology::Shells {
+            quads: vec![[0, 1, 2, 3]],
+            section: Section::of(thickness, Rule::Gauss(2)),
+            thicknesses: Vec::new(),
+        },
+        nodes: (4 * i..4 * i + 4).collect(),
+        element_ids: vec![i + 1],
+        hourglass: crate::element::hourglass::Hourglass::VISCOUS,
+    };
+    let at = |i: u32| corners.map(|[x, y]| [x, y, gap * f64::from(i)]);
+    Mesh {
+        positions: (0..n).flat_map(at).collect(),
+        node_ids: (1..=4 * n).collect(),
+        parts: (0..n).map(part).collect(),
+        lumped: Vec::new(),
+    }
+}
+
+#[test]
+fn nodes_of_shells_give_a_body_their_own_inertia_and_what_they_turn_with() {
+    for gap in [0.01, 0.0] {
+        let mesh = squares(2, gap, 0.01);
+        let given = || shape::Given { nodes: vec![2, 6], ..shape::Given::default() };
+        let (mut velocity, mut spin) = (vec![[0.0; 3]; 8], vec![[0.0; 3]; 8]);
+        (velocity[2], velocity[6]) = ([1.0, 0.0, 0.0], [-1.0, 0.0, 2.0]);
+        (spin[2], spin[6]) = ([0.0, 5.0, 30.0], [0.0, 1.0, -10.0]);
+        let body = made_of(&mesh, given(), (&velocity, &spin)).expect("a body");
+        let mass = 8000.0 * 0.2 * 0.2 * 0.01 / 4.0;
+        let (own, arm) = (mass * 0.2 * 0.2 / 8.0, 0.5 * gap);
+        let expected = [2.0 * (own + mass * arm * arm), 2.0 * (own + mass * arm * arm), 2.0 * own];
+        // Velocities of +1 and -1 at arms of -gap / 2 and gap / 2.
+        let angular = [0.0, 6.0 * own - 2.0 * mass * arm, 20.0 * own];
+        for a in 0..3 {
+            assert!((body.inertia[a] / expected[a] - 1.0).abs() < 1e-12, "{:?} {expected:?}", body.inertia);
+            assert!((body.start.momentum[a] - angular[a]).abs() < 1e-12 * own, "{:?}", body.start);
+            assert!((body.start.spin[a] - angular[a] / expected[a]).abs() < 1e-11, "{:?}", body.start);
+        }
+        assert_eq!(body.start.velocity, [0.0, 0.0, 1.0]);
+        assert!(body.reach() >= arm.max((own / mass).sqrt()), "{}", body.reach());
+    }
+    // Solids in one point have nothing that could turn.
+    let mesh = two_bricks([1.0; 3]);
+    let given = shape::Given { nodes: vec![7, 8], ..shape::Given::default() };
+    assert!(made(&mesh, given, &[[0.0; 3]; 16]).is_err());
+}
+
+#[test]
+fn a_rigid_shell_has_the_inertia_of_its_thickness_and_what_hangs_on_it_that_of_its_nodes() {
+    let mesh = squares(2, 0.05, 0.01);
+    let mass = 8000.0 * 0.2 * 0.2 * 0.01;
+    let inertia_of = |nodes: Vec<u32>| {
+        let given = shape::Given { parts: vec![0], nodes, ..shape::Given::default() };
+        made(&mesh, given, &[[0.0; 3]; 8]).expect("a body").inertia
+    };
+    let alone = inertia_of(Vec::new());
+    let plate = mass * (0.2 * 0.2 + 0.2 * 0.2) / 12.0;
+    assert!((alone[2] / plate - 1.0).abs() < 1e-12, "{alone:?}");
+    let flat = mass * (0.2 * 0.2 + 0.01 * 0.01) / 12.0;
+    assert!((alone[0] / flat - 1.0).abs() < 1e-12, "{alone:?}");
+    // A corner of the other hangs above one of its own: a quarter of the mass, on the diagonal.
+    let hung = inertia_of(vec![6]);
+    let quarter = 0.25 * mass;
+    let reduced = quarter * mass / (quarter + mass);
+    let expected = plate + quarter * 0.2 * 0.2 / 8.0 + reduced * 2.0 * 0.1 * 0.1;
+    assert!((hung[2] / expected - 1.0).abs() < 1e-12, "{hung:?} {expected}");
 }
