@@ -118,8 +118,7 @@ impl Given {
     }
 }
 
-/// Inertia that nodes on one line are given about it, over the largest that they have, where nothing turns them about it: what pushes nodes
-/// of solids, trusses and springs has no moment about that line, and those of shells and beams have a rotational inertia of their own.
+/// Inertia about an axis, over half the sum of those about three, below which nodes count as being on a line.
 const LINE_INERTIA: f64 = 1e-6;
 
 /// Least share of the inertia of its nodes that a body may have: contact finds its time step by the masses of nodes.
@@ -258,13 +257,17 @@ pub fn body(
     })
 }
 
-/// Gives nodes on a line that have hardly any inertia about it some; leaves that of others.
+/// Gives nodes on a line about it the inertia that they have across it; leaves that of others.
+///
+/// What pushes nodes of solids, trusses and springs has no moment about that line, and those of shells and beams have a rotational inertia of
+/// their own, so any would do. With this one the angular velocity is along the angular momentum, wherever the line turns: with a small
+/// one a little of what belongs across the line would count as a fast turn about it.
 pub(super) fn widen(inertia: &mut [f64; 6]) {
-    let least = LINE_INERTIA * inertia[0].max(inertia[1]).max(inertia[2]);
+    let across = 0.5 * (inertia[0] + inertia[1] + inertia[2]);
     let mut rest = *inertia;
-    (0..3).for_each(|a| rest[a] -= least);
+    (0..3).for_each(|a| rest[a] -= LINE_INERTIA * across);
     if !is_positive(&rest) {
-        (0..3).for_each(|a| inertia[a] += least);
+        *inertia = [across, across, across, 0.0, 0.0, 0.0];
     }
 }
 
