@@ -8,9 +8,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::exact::Quantum;
+use damper::Damped;
 use spring::Spring;
 use stick::Held;
 
+pub(super) mod damper;
 pub(super) mod lanes;
 pub(super) mod spring;
 pub(super) mod stick;
@@ -153,21 +155,22 @@ pub fn react(
     reaction(push, force, energy, friction, force_quantum)
 }
 
-/// The same with friction that sticks.
+/// The same with a push that is damped and friction that sticks.
 #[inline(always)]
 pub(super) fn react_held(
     push: &Push,
+    damped: &Damped,
     held: &Held,
     (force_quantum, energy_quantum): (Quantum, Quantum),
     cycle: u64,
 ) -> Reaction {
-    let normal = push.spring.force;
     let mut force = [0.0; 3];
     for a in 0..3 {
-        force[a] = normal.mul_add(push.direction[a], held.force[a]);
+        force[a] = damped.normal.mul_add(push.direction[a], held.force[a]);
     }
     let energy = energy_quantum.round(push.spring.energy + held.stored);
-    reaction(push, force, energy, energy_quantum.dithered(cycle).round(held.taken), force_quantum)
+    let taken = energy_quantum.dithered(cycle).round(damped.taken + held.taken);
+    reaction(push, force, energy, taken, force_quantum)
 }
 
 /// Puts the force of a hit on its node and corners.

@@ -179,3 +179,58 @@ fn edges_that_cross_without_a_node_in_a_zone_are_not_seen() {
     assert_eq!(world.forces(1.0).hits, 0);
     assert!(world.batch.is_sound(2) && !world.batch.is_sound(1));
 }
+
+/// A probe over a face of a block of one element, where friction sticks; the node's spring at a depth of half a gap pushes with 0.025.
+fn with_sticking_probe() -> (World, usize) {
+    let (mut world, probe) = with_probe(block([1, 1, 1], 1.0), 0.1, &|_| true);
+    world.place(probe, [0.4, 0.55, 1.05]);
+    world.settings.friction.fill(0.3);
+    world.settings.sticks = true;
+    world.contact = Contact::new(&world.batch, &world.settings, &world.x, Width::best());
+    (world, probe)
+}
+
+#[test]
+fn where_friction_sticks_a_push_is_damped_and_never_pulls() {
+    let (mut world, probe) = with_sticking_probe();
+    let (dt, k, gap) = (1e-3, 0.5, 0.1);
+    for depth in [1e-5, 0.05] {
+        world.place(probe, [0.4, 0.55, 1.1 - depth]);
+        let spring = k * depth;
+        let mut normal = |velocity: f64| {
+            world.v[2][probe] = velocity;
+            let vote = world.forces(dt);
+            assert_eq!(totals(&world).0, [0.0; 3], "node and corners add to nothing, to the bit");
+            (world.force_on(probe)[2], vote.friction)
+        };
+        let (at_rest, none) = normal(0.0);
+        assert!((at_rest - spring).abs() < 1e-14 && none == 0.0, "{at_rest} {none}");
+        // Slowly, against what closes and what parts; the masses are 1, the weights a little off a quarter.
+        let ([closing, taken], [parting, as_much]) = (normal(-1e-6).into(), normal(1e-6).into());
+        let drag: f64 = closing - spring;
+        assert!((drag / (0.6 * (k / 1.27_f64).sqrt() * 1e-6) - 1.0).abs() < 0.02, "{drag:e}");
+        assert!((drag - (spring - parting)).abs() < 1e-14, "{drag:e} {parting}");
+        assert!((taken - drag * 1e-6 * dt).abs() < 1e-14 && (as_much - taken).abs() < 1e-14, "{taken:e}");
+        // As fast as may be: a fifth of the spring's force, and of that of a five thousandth of the gap where it is deeper.
+        let limit = 0.2 * k * depth.min(2e-4 * gap);
+        for velocity in [-1e3_f64, 1e3] {
+            let (limited, taken) = normal(velocity);
+            assert!((limited - (spring - limit.copysign(velocity))).abs() < 1e-14, "{velocity}: {limited}");
+            assert!((taken - limit * 1e3 * dt).abs() < 1e-14, "{velocity}: {taken}");
+        }
+    }
+}
+
+#[test]
+fn friction_that_creeps_and_contact_without_friction_have_no_damper() {
+    for friction in [0.0, 0.3] {
+        let (mut world, probe) = with_sticking_probe();
+        world.settings.friction.fill(friction);
+        world.settings.sticks = friction == 0.0;
+        world.contact = Contact::new(&world.batch, &world.settings, &world.x, Width::best());
+        let still = world.forces(1e-3);
+        let force = world.force_on(probe);
+        world.v[2][probe] = -5.0;
+        assert_eq!((world.forces(1e-3), world.force_on(probe)), (still, force));
+    }
+}

@@ -4,7 +4,7 @@ use super::{
     super::{
         BatchEdge, Settings, WARNING,
         batch::Batch,
-        force::{self, spring::Hardening},
+        force::{self, damper::Damper, spring::Hardening},
         pair::{Books, Cycle, Pairs},
         zone::Vector,
     },
@@ -39,6 +39,8 @@ pub(in super::super) struct Edges {
     gap: f64,
     hardening: Hardening,
     friction_velocity: f64,
+    /// Whether friction sticks, so that pushes are damped (edges themselves do not stick).
+    sticks: bool,
 }
 
 impl Edges {
@@ -77,6 +79,7 @@ impl Edges {
             gap: settings.gap,
             hardening: Hardening::of(settings.gap),
             friction_velocity: settings.friction_velocity,
+            sticks: settings.any_sticks(),
         }
     }
 
@@ -128,12 +131,17 @@ impl Edges {
         vote.deepest(depth / self.gap, names);
         let depth = self.gap - distance;
         let spring = self.hardening.spring_of_one(pair.stiffness, depth);
-        let normal = weight.value * spring.force;
-        let mut force = [normal * n[0], normal * n[1], normal * n[2]];
-        let mut friction = 0.0;
+        let mut normal = weight.value * spring.force;
+        let (mut drag, mut taken) = (None, 0.0);
         if pair.friction > 0.0 {
             let inverse_mass = sides[0].inverse_mass.iter().chain(&sides[1].inverse_mass);
             let inverse_mass: f64 = inverse_mass.zip(shares).map(|(m, share)| m * (share * share)).sum();
+            if self.sticks {
+                let stiffness = weight.value * pair.stiffness;
+                let damper = Damper { stiffness, inverse_mass, gap: self.gap, velocity, dt: cycle.dt };
+                let damped = damper.of(normal, n);
+                (normal, taken) = (damped.normal, damped.taken);
+            }
             let sliding = force::Sliding {
                 coefficient: pair.friction,
                 regular: self.friction_velocity,
@@ -141,13 +149,16 @@ impl Edges {
                 inverse_mass,
                 dt: cycle.dt,
             };
-            if let Some((drag, v, taken)) = sliding.drag(normal, n) {
-                for a in 0..3 {
-                    force[a] = (-drag).mul_add(v[a], force[a]);
-                }
-                friction = cycle.energy_quantum.dithered(cycle.history.cycle).round(taken);
-            }
+            drag = sliding.drag(normal, n);
         }
+        let mut force = [normal * n[0], normal * n[1], normal * n[2]];
+        if let Some((drag, v, by_sliding)) = drag {
+            for a in 0..3 {
+                force[a] = (-drag).mul_add(v[a], force[a]);
+            }
+            taken += by_sliding;
+        }
+        let friction = cycle.energy_quantum.dithered(cycle.history.cycle).round(taken);
         let energy = spring.energy;
         let [mut of_u, mut of_v] = [[0.0; 3]; 2];
         if let Some([along, by_u, by_v]) = weight.slopes {

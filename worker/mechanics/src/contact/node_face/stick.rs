@@ -8,6 +8,7 @@ use crate::{
     contact::{
         force::{
             self, Push, Reaction,
+            damper::Damper,
             stick::{Coefficient, Sticking},
         },
         history::History,
@@ -59,10 +60,13 @@ impl NodeFace {
         if keeps {
             sticking.elongation.copy_from_slice(&history.before(node)[first..first + 3]);
         }
-        let held = sticking.hold(push.stiffness, push.spring.force, push.direction);
+        let Sticking { inverse_mass, velocity, dt, .. } = sticking;
+        let damper = Damper { stiffness: push.stiffness, inverse_mass, gap: self.settings.gap, velocity, dt };
+        let damped = damper.of(push.spring.force, push.direction);
+        let held = sticking.hold(push.stiffness, damped.normal, push.direction);
         if keeps {
             history.after_mut(node)[first..first + 3].copy_from_slice(&held.elongation);
         }
-        force::react_held(push, &held, quanta, history.cycle)
+        force::react_held(push, &damped, &held, quanta, history.cycle)
     }
 }
