@@ -19,6 +19,7 @@ mod joints;
 mod late;
 mod pairs;
 mod particles;
+mod rest;
 mod sections;
 mod seeds;
 mod spans;
