@@ -238,10 +238,31 @@ fn contact_fault(problem: &Problem, vote: &Vote, cycle: u64) -> String {
     };
     let edges_meet = problem.model.setup.contact.as_ref().is_some_and(|contact| contact.edges);
     let or_edges = if edges_meet { "" } else { ", or set contact.edges = true if edges cross there" };
+    // Deeper than its face lies, a node has not been pressed there: the face came over it with elements that collapsed or turned over.
+    let behind = if other & EDGE == 0 && vote.worst_depth > 1.0 {
+        behind_a_face(problem, other)
+    } else {
+        String::new()
+    };
     format!(
-        "{what} {} is {:.2} gaps into the contact zone of {whose} at cycle {cycle}, at most {DEEPEST}; raise contact.stiffness or the gap{or_edges}",
+        "{what} {} is {:.2} gaps into the contact zone of {whose} at cycle {cycle}, at most {DEEPEST}; {behind}raise contact.stiffness or the gap{or_edges}",
         id(node),
         vote.worst_depth
+    )
+}
+
+/// What helps where a node is behind a face: above all what keeps the elements of the face's part in shape, or takes them out.
+fn behind_a_face(problem: &Problem, face: u32) -> String {
+    let erodes = problem.model.setup.erosion.is_on();
+    // Faces are numbered anew whenever elements erode.
+    let surface = problem.touching.as_ref().map(|touching| &touching.surface).filter(|_| !erodes);
+    let face = surface.and_then(|surface| surface.faces.get(face as usize));
+    let part = match face.and_then(|face| problem.model.mesh.parts.get(face.part as usize)) {
+        Some(part) => format!("part `{}`", part.name),
+        None => "the part of that face".into(),
+    };
+    format!(
+        "it is behind the face, so elements of {part} have probably collapsed or turned over: let them erode (`erosion = {{ geometric_strain = 1.5 }}`) or give the part `hourglass = 0.1`; if not, "
     )
 }
 
@@ -337,5 +358,22 @@ mod tests {
         account.run_totals.contacts.push(touched);
         assert_eq!(account.run_totals.bodies().len(), 1);
         assert_eq!(account.body_runs_away(problem, (30, problem.quanta.energy)), None);
+    }
+
+    #[test]
+    fn a_node_behind_a_face_asks_for_what_keeps_elements_of_its_part_from_collapse() {
+        let (job, _) = job(1);
+        let surface = &job.problem.touching.as_ref().expect("the cubes may meet").surface;
+        let face = surface.faces.iter().position(|face| face.part == 1).expect("a face of the second cube");
+        let told = |worst_depth| {
+            let vote = Vote { worst_depth, worst_pair: (3, face as u32), ..Vote::empty(2) };
+            contact_fault(&job.problem, &vote, 7)
+        };
+        let name = &job.problem.model.mesh.parts[1].name;
+        let advice = format!(
+            "at most 0.9; it is behind the face, so elements of part `{name}` have probably collapsed or turned over: let them erode"
+        );
+        assert!(told(1.99).contains(&advice) && told(1.99).contains("`hourglass = 0.1`"), "{}", told(1.99));
+        assert!(told(0.95).contains("at most 0.9; raise contact.stiffness"), "{}", told(0.95));
     }
 }
