@@ -54,7 +54,7 @@ fn a_charge_within_a_tube_of_shells_widens_it() {
     let shape = "prism = { axis = \"z\", base = [0, 0, -0.3], radius = 0.4, length = 0.6, cells = [16, 4] }";
     let wave = Wave::at(Burst::Air, 0.4, 1.0);
     let wide = |solved: &Solved| {
-        let radii = solved.state.x.iter().map(|x| x[0].hypot(x[1]));
+        let radii = solved.state.x.iter().map(|x| x[0].mul_add(x[0], x[1] * x[1]).sqrt());
         radii.fold([f64::MAX, 0.0], |[least, most]: [f64; 2], r| [least.min(r), most.max(r)])
     };
     let end = 1e-3 * (wave.arrival + wave.duration);
