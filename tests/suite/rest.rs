@@ -54,9 +54,9 @@ fn a_stack_of_blocks_rests_below_the_angle_of_friction() {
     ];
     let solved = on_an_incline(10.0, 1.0, &blocks);
     let creeps = [0, 1, 2].map(|gauge| creep(&solved, gauge));
-    println!("creep at {creeps:e?} m/s, energy error {:e}", solved.rows.last().expect("rows").error);
+    println!("creep at {creeps:?} m/s, energy error {:e}", solved.rows.last().expect("rows").error);
     // Without a damper 2.7e-4, 1.1e-3 and 3.9e-3, from the lowest up. What is left is the sway of the stack.
-    assert!(creeps.iter().all(|creep| creep.abs() < 1e-4), "{creeps:e?}");
+    assert!(creeps.iter().all(|creep| creep.abs() < 1e-4), "{creeps:?}");
 }
 
 /// Two blocks that meet head-on: what friction and dampers took of their energy, and their rebound's velocity over that before.
