@@ -194,12 +194,11 @@ pub(super) fn start_bodies(
 ) {
     for ((id, _), body) in t.names.iter().zip(&t.mesh.bodies) {
         let Some(lead) = t.bodies.of(*id) else { continue };
+        // The others begin as their nodes say.
+        let Some([velocity, _]) = t.bodies.starts.get(&lead) else { continue };
         for node in body.corners() {
-            // Nodes of a body turn as it does.
+            velocities.insert(node, *velocity);
             spins.remove(&node);
-            if let Some([velocity, _]) = t.bodies.starts.get(&lead) {
-                velocities.insert(node, *velocity);
-            }
         }
     }
 }
