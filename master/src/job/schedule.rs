@@ -197,8 +197,11 @@ impl Schedule {
             (&mut self.quanta.energy, energy, ENERGY_BITS),
             (&mut self.quanta.momentum, momentum, MOMENTUM_BITS),
         ] {
-            if sum > quantum.sum_bound() && sum.is_finite() {
-                *quantum = Quantum::for_reference(sum, bits);
+            // What no quantum holds is wrong, and found so where it is judged.
+            if sum > quantum.sum_bound()
+                && let Some(coarser) = Quantum::if_normal(sum, bits)
+            {
+                *quantum = coarser;
             }
         }
         Ok(())
@@ -475,5 +478,11 @@ mod tests {
         let mass = 1.01 * most * most / (2.0 * energy);
         schedule.rescale(&vote(energy), mass).expect("below the bound");
         assert!(schedule.quanta().momentum.value() > before.momentum.value());
+        // A flipped bit may say anything.
+        let before = schedule.quanta();
+        for absurd in [1e300, f64::INFINITY, f64::NAN] {
+            schedule.rescale(&vote(absurd), f64::MIN_POSITIVE).expect("no force");
+            assert_eq!(schedule.quanta().energy, before.energy, "{absurd}");
+        }
     }
 }

@@ -29,12 +29,15 @@ impl Quantum {
     /// If `reference` is not a positive finite number or the quantum would leave the range of normal numbers.
     pub fn for_reference(reference: f64, bits: i32) -> Self {
         assert!(reference.is_finite() && reference > 0.0, "reference magnitude {reference} must be positive");
+        let quantum = Self::if_normal(reference, bits);
+        quantum.unwrap_or_else(|| panic!("quantum out of range for reference {reference:e} of {bits} bits"))
+    }
+
+    /// The same; none where there is no such quantum.
+    pub fn if_normal(reference: f64, bits: i32) -> Option<Self> {
         let exponent = ((reference.to_bits() >> 52) & 0x7ff) as i32 - 1022 - bits;
-        assert!(
-            (-1000..900).contains(&exponent),
-            "quantum 2^{exponent} out of range for reference {reference}"
-        );
-        Self { q: power_of_two(exponent) }
+        let is_good = reference.is_finite() && reference > 0.0 && (-1000..900).contains(&exponent);
+        is_good.then(|| Self { q: power_of_two(exponent) })
     }
 
     /// This quantum times a power of two.
