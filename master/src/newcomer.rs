@@ -82,15 +82,7 @@ pub fn join(master: &str, token: &str, name: &str, folder: &Path) -> std::result
             ));
         }
     }
-    exchange_into(master, token, name, folder)
-}
-
-/// The same in place of certificates that count no more; they stay until there are others.
-///
-/// # Errors
-/// Why not, as a sentence.
-pub fn join_anew(master: &str, token: &str, name: &str, folder: &Path) -> std::result::Result<(), String> {
-    exchange_into(master, token, name, folder)
+    join_anew(master, token, name, folder)
 }
 
 /// Whether a certificate is one, and out of date.
@@ -98,7 +90,11 @@ pub fn has_expired(certificate: &Path) -> bool {
     tls::identity_of_file(certificate).is_ok_and(|identity| identity.fault(None, SystemTime::now()).is_some())
 }
 
-fn exchange_into(master: &str, token: &str, name: &str, folder: &Path) -> std::result::Result<(), String> {
+/// The same in place of certificates that count no more; they stay until there are others.
+///
+/// # Errors
+/// Why not, as a sentence.
+pub fn join_anew(master: &str, token: &str, name: &str, folder: &Path) -> std::result::Result<(), String> {
     let token: Token = token.parse().map_err(|e: Error| e.to_string())?;
     let (key, request) = certs::make_request().map_err(|e| e.to_string())?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();

@@ -21,8 +21,7 @@ use rayon::prelude::*;
 use crate::{
     deck_file::read_deck_with,
     results::{
-        HISTORY, Summary, Units, contact_name,
-        history::Table,
+        Summary, Units, contact_name,
         report::Picture,
         vtu::{
             self, Fields,
@@ -152,7 +151,7 @@ impl About {
     /// Of a results folder, or a file in one.
     fn of(results: &Path) -> Self {
         let summary = Summary::read(folder(results)).unwrap_or_default();
-        Self { title: summary.title, units: units_of(results), mirrors: summary.mirrors }
+        Self { title: summary.title, units: Units::of_results(folder(results)), mirrors: summary.mirrors }
     }
 }
 
@@ -274,18 +273,6 @@ fn unknown(field: &str, known: &[String], path: &Path) -> String {
 /// Folder of a results folder, or of a file in one.
 fn folder(results: &Path) -> &Path {
     if results.is_file() { results.parent().unwrap_or(Path::new(".")) } else { results }
-}
-
-/// The units of a run, by the headings of its history; dimensions where there is none.
-pub fn units_of(results: &Path) -> Units {
-    let columns = Table::read_columns(&folder(results).join(HISTORY), &[]).map(|(columns, _)| columns);
-    let columns = columns.unwrap_or_default();
-    let fits = |units: &Units| {
-        let (time, energy) = (format!("time [{}]", units.time), format!("kinetic [{}]", units.energy));
-        columns.contains(&time) && columns.contains(&energy)
-    };
-    let sets = ["SI", "cm-g-us", "mm-ms-kg", "mm-s-t", "in-s-lbf"].map(Units::named);
-    sets.into_iter().find(fits).unwrap_or(Units::named(""))
 }
 
 /// The picture of a skin, `size` pixels wide and high.

@@ -421,6 +421,18 @@ pub struct Units {
 }
 
 impl Units {
+    /// The units of a results folder, by the headings of its history; dimensions where there is none.
+    pub fn of_results(folder: &Path) -> Self {
+        let columns = history::Table::read_columns(&folder.join(HISTORY), &[]).map(|(columns, _)| columns);
+        let columns = columns.unwrap_or_default();
+        let fits = |units: &Self| {
+            let (time, energy) = (format!("time [{}]", units.time), format!("kinetic [{}]", units.energy));
+            columns.contains(&time) && columns.contains(&energy)
+        };
+        let sets = ["SI", "cm-g-us", "mm-ms-kg", "mm-s-t", "in-s-lbf"].map(Self::named);
+        sets.into_iter().find(fits).unwrap_or(Self::named(""))
+    }
+
     /// The units that [`deck::model::Model::units`] names; an unknown name gives the dimensions themselves.
     pub fn named(name: &str) -> Self {
         let (length, mass, time, energy, stress, force, specific) = match name {

@@ -29,7 +29,6 @@ use crate::{
     http::board::Board,
     notice::{Error, Notice},
     notify::{Notifier, Over},
-    picture,
     queue::{self, Change, Entry, Queue, Size, Starts, Wish, is_over},
     results::Units,
     scheduler::{allotment::Call, retention::Limits},
@@ -172,7 +171,7 @@ impl Scheduler {
         }
         // What is told of a run is not kept: of one without a summary its history has the unit of its time.
         let has_summary = ended.as_ref().is_some_and(|ended| ended.summary.is_some());
-        let units = (cycle > 0 && !has_summary).then(|| picture::units_of(&self.spool.results(job)));
+        let units = (cycle > 0 && !has_summary).then(|| Units::of_results(&self.spool.results(job)));
         let unit = units.map(|units| units.time).filter(|unit| *unit != Units::named("").time);
         let time_unit = unit.unwrap_or_default().to_owned();
         self.status.insert(

@@ -193,15 +193,12 @@ fn joined_parts_on_a_wall_have_the_same_bits() {
 /// heavy ram that a curve drives.
 #[test]
 fn energies_that_nobody_foresaw_have_the_same_bits() {
-    let thrown = |modulus: &str| {
-        format!(
-            "title = \"thrown\"\nunits = \"SI\"\n[control]\nend_cycle = 200\nend_time = 1\n[output]\nhistory_cycles = 1\n[[part]]\nname = \"flyer\"\n\
-             material = {{ density = 8000, eos = {{ type = \"linear\", bulk = {modulus} }} }}\n\
-             box = {{ origin = [0, 0, 0], size = [0.1, 0.1, 0.004], cells = [7, 7, 2] }}\n\
-             [[load]]\ntype = \"pressure\"\nface = \"k-min\"\npressure = 1e9\n"
-        )
-    };
-    let flyer = model(&thrown("20e9"));
+    let flyer = model(
+        "title = \"thrown\"\nunits = \"SI\"\n[control]\nend_cycle = 200\nend_time = 1\n[output]\nhistory_cycles = 1\n[[part]]\nname = \"flyer\"\n\
+         material = { density = 8000, eos = { type = \"linear\", bulk = 20e9 } }\n\
+         box = { origin = [0, 0, 0], size = [0.1, 0.1, 0.004], cells = [7, 7, 2] }\n\
+         [[load]]\ntype = \"pressure\"\nface = \"k-min\"\npressure = 1e9\n",
+    );
     let solved = solve(flyer.clone(), Workers::default()).unwrap_or_else(|e| panic!("{e}"));
     let last = solved.rows.last().expect("rows");
     // A thousandth of the modulus in its volume, of which sums hold 128.

@@ -119,22 +119,27 @@ fn a_rotation_that_begins_late_gives_the_energy_of_rotation_as_its_work() {
     assert!((last.external / last.kinetic - 1.0).abs() < 1e-6 && last.error.abs() < 1e-6, "{last:?}");
 }
 
-/// What is strained and turns keeps its energy: rubber-like bars that spin, pulled by what they weigh. Energies of the stress turned to the end of a
-/// step, in place of that in its middle, would rise by 2 % in this time.
+/// What is strained and turns keeps its energy: rubber-like bars that spin, pulled by what they weigh. By the stress turned to the end of a
+/// step, in place of that in its middle, one of a single element gained 2.0 % in this time, one of 16 elements 0.15 %.
 #[test]
 fn what_is_strained_and_spins_keeps_its_energy() {
-    for keys in ["", "points = 8\n", "hourglass = { kind = \"stiffness\" }\n"] {
+    let kinds = ["", "points = 8\n", "hourglass = { kind = \"stiffness\" }\n"];
+    for (keys, cells) in kinds.into_iter().flat_map(|keys| [[1, 1, 1], [4, 2, 2]].map(|cells| (keys, cells)))
+    {
         let mut bar = model(&format!(
             "title = \"bar\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = 1\nenergy_error = 10\n[output]\nhistory_cycles = 20\n\
              [[part]]\nname = \"bar\"\n{keys}material = {{ density = 1e-6, eos = {{ type = \"linear\", bulk = 0.5 }}, strength = {{ type = \"elastic\", shear = 8e-3 }} }}\n\
-             box = {{ origin = [-2, -1, -1], size = [4, 2, 2], cells = [4, 2, 2] }}\n"
+             box = {{ origin = [-2, -1, -1], size = [4, 2, 2], cells = {cells:?} }}\n"
         ));
         let spin = |[x, y, _]: [f64; 3]| [-15.8 * y, 15.8 * x, 0.0];
         bar.velocity = bar.mesh.positions.iter().map(|x| spin(*x)).collect();
         let solved = run(bar);
         let last = solved.rows.last().expect("rows");
-        println!("{keys}internal {:e} of {:e}, error {:e}", last.internal, last.kinetic, last.error);
+        println!(
+            "{keys}{cells:?} internal {:e} of {:e}, error {:e}",
+            last.internal, last.kinetic, last.error
+        );
         assert!(last.internal > 1e-3 * last.kinetic, "hardly strained: {last:?}");
-        assert!(last.error.abs() < 2e-3, "{keys}{last:?}");
+        assert!(last.error.abs() < 5e-4, "{keys}{cells:?} {last:?}");
     }
 }

@@ -2,9 +2,10 @@
 //!
 //! Peak and impulse of a face that reflects straight back are fits to the charts of UFC 3-340-02, figures 2-8 (a sphere in free air) and
 //! 2-16 (a hemisphere on the ground), by S. E. Rigby, A. Tyas, T. Bennett, S. D. Clarke, S. D. Fay, The negative phase of the blast load,
-//! International Journal of Protective Structures 5 (2014) 1-19. Those of the hemisphere are published there, up to 37.6 m/kg^(1/3); those of
-//! the sphere are of Rigby's program Blast.m, as A. W. Q. R. Reis transcribed it (DYNAblast, 2019). Both are good to some 10 % of the charts from 1 m/kg^(1/3) on;
-//! nearer, the peak is a bound of the charts, 100 kPa. The pressure is Granstrom's cubic
+//! International Journal of Protective Structures 5 (2014) 1-19. Those of the hemisphere are published there, up to 37.6 m/kg^(1/3) (read from
+//! a program that has them, not from the paper); those of
+//! the sphere are of Rigby's program Blast.m, as A. W. Q. R. Reis transcribed it (DYNAblast, 2019). Near a charge
+//! the peak is a bound of the charts, 100 kPa. The pressure is Granstrom's cubic
 //! `-p (27/4) s (1 - s)^2`, s the time since the end of the positive phase over a duration which gives it its impulse,
 //! `16/9 i / p`: it starts from nothing, is lowest at a third and ends.
 //!
