@@ -18,7 +18,10 @@ mod volumes;
 
 use super::{
     ElementVote, Fault, Step,
-    hourglass::{Amplitudes, Frame, LEAST_STRAIN, PLASTIC, Resistance, amplitude, growth, stress_square},
+    hourglass::{
+        Amplitudes, Frame, LEAST_STRAIN, OF_SUMS, PLASTIC, Resistance, amplitude, bounded, growth,
+        stress_square,
+    },
     layout::{Corners, Layout},
     modes::{Gradient, Modes, corner_values, modes_of},
     place::{Bases, Nodal, PACKED, Packed, Place, Rows},
@@ -320,6 +323,7 @@ unsafe fn slots<L: Lane, P: Place, E: EquationOfState, S: StrengthLaw, F: Failur
         let failed = one.less_equal(damage_after);
         coefficient = L::select(failed, L::splat(2.0 * laws.hourglass.failed), coefficient);
     }
+    let coefficient = bounded(coefficient, [&x.d, &x.e, &x.f, &x.g], &spread, inverse_volume, OF_SUMS);
     let mut resist = coefficient * density * sound * area;
     let mut taken = L::splat(step.dt / 8.0) * resist * modes_square;
     let mut resisted = hourglass;

@@ -7,7 +7,7 @@
 //! stress `-(8/V) sum_m p_m x_m^T` (not symmetric), and is given to the element as that, so that the forces have
 //! neither resultant nor moment. The power taken from the nodes is `8 sum_m p_m . q_m`.
 //!
-//! - Viscous (Flanagan and Belytschko 1981): `p = c q`, `c = 2 Q rho c_sound V / L_v`.
+//! - Viscous (Flanagan and Belytschko 1981): `p = c q`, `c = 2 Q rho c_sound V / L_v`, less in bent elements: see [`bounded`].
 //! - Stiffness (the same): `dp = k q dt`, `k = Q (K + 4G/3) V / (2 L_v^2)`, so that with Q = 1 the modes of a cube are as fast as
 //!   its fastest strain.
 //! - Assumed strain (Belytschko and Bindeman 1993, their ASQBI element for three dimensions): `p` grows as the elastic stress of those
@@ -20,7 +20,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::vector::{Tensor, Vector};
+use super::{
+    vector::{Tensor, Vector},
+    viscosity::Spread,
+};
 use crate::{
     lanes::{Lane, scalar::Scalar},
     material::{Failure, Material},
@@ -286,6 +289,27 @@ impl<L: Lane> Amplitudes<L> {
     pub fn against(&self, d: &Vector<L>, e: &Vector<L>, f: &Vector<L>, g: &Vector<L>) -> Tensor<L> {
         Tensor::outer(&self.d, d).outer_add(&self.e, e).outer_add(&self.f, f).outer_add(&self.g, g)
     }
+}
+
+/// The scale of [`bounded`] for `512 S` and modes that are plain sums over eight corners, whose patterns are as long as the root of 8.
+pub(crate) const OF_SUMS: f64 = 1.0 / 4096.0;
+
+/// Twice the coefficient of viscous control that an element has for one that its part has, twice as well. Forces reach the nodes by the
+/// patterns h_m of the modes (here of length 1) less what of these is linear, `h_m - x_m . B / V`, with the modes x_m of the corners.
+/// `e = sum_m x_m . S x_m / V^2` is the square of that second part: nothing in a parallelepiped, little in a usual mesh, and thousands in an
+/// element that is squashed and bent. So many times as fast would the control damp its nodes, which beyond a step drives them:
+/// `Q / (1 + Q e / 0.1)` keeps the rate below that of a cube with Q = 0.1. `scale` takes S and the modes to the units of `V^2`.
+#[inline(always)]
+pub(crate) fn bounded<L: Lane, const N: usize>(
+    twice_coefficient: L,
+    modes: [&Vector<L>; N],
+    spread: &Spread<L>,
+    inverse_volume: L,
+    scale: f64,
+) -> L {
+    let one = L::splat(1.0);
+    let longer = Spread::gram(modes).contract(spread) * inverse_volume * inverse_volume;
+    twice_coefficient / (L::splat(0.5 * scale / FLUID) * twice_coefficient).mul_add(longer, one)
 }
 
 /// The geometry of an element that elastic forces grow by.

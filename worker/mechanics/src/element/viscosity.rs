@@ -25,25 +25,29 @@ impl<L: Lane> Spread<L> {
     /// `512 S` from the vectors `64 G_m` of the gradient, since `S = 8 sum_m G_m G_m^T`.
     #[inline(always)]
     pub fn of(gradient: [&Vector<L>; 6]) -> Self {
-        let [a, b, c, d, e, f] = gradient;
+        Self::gram(gradient)
+    }
+
+    /// `sum a a^T` over these vectors.
+    #[inline(always)]
+    pub fn gram<const N: usize>(vectors: [&Vector<L>; N]) -> Self {
+        let a = vectors[0];
         let mut s =
             Self { xx: a.x * a.x, yy: a.y * a.y, zz: a.z * a.z, xy: a.x * a.y, yz: a.y * a.z, zx: a.z * a.x };
-        s.add(b);
-        s.add(c);
-        s.add(d);
-        s.add(e);
-        s.add(f);
+        let mut other = 1;
+        while other < N {
+            s.add(vectors[other]);
+            other += 1;
+        }
         s
     }
 
-    /// `sum a a^T` over three vectors.
+    /// `self : other`.
     #[inline(always)]
-    pub fn gram([a, b, c]: [&Vector<L>; 3]) -> Self {
-        let mut s =
-            Self { xx: a.x * a.x, yy: a.y * a.y, zz: a.z * a.z, xy: a.x * a.y, yz: a.y * a.z, zx: a.z * a.x };
-        s.add(b);
-        s.add(c);
-        s
+    pub fn contract(&self, other: &Self) -> L {
+        let off = self.xy.mul_add(other.xy, self.yz.mul_add(other.yz, self.zx * other.zx));
+        let on = self.xx.mul_add(other.xx, self.yy.mul_add(other.yy, self.zz * other.zz));
+        L::splat(2.0).mul_add(off, on)
     }
 
     #[inline(always)]

@@ -15,7 +15,7 @@ use crate::{
             offer_faults, offer_limit, spin_of,
             stress::Stressed,
         },
-        hourglass::{Amplitudes, LEAST_STRAIN, PLASTIC},
+        hourglass::{Amplitudes, LEAST_STRAIN, PLASTIC, bounded},
         place::{Nodal, PACKED, Place},
         rotation::rotation,
         vector::{Tensor, Vector},
@@ -142,6 +142,8 @@ pub(super) unsafe fn slots<L: Lane, S: StrengthLaw, F: FailureLaw>(
         coefficient = L::select(failed, L::splat(2.0 * laws.hourglass.failed), coefficient);
     }
     let by_mass = L::splat(8.0 / form.n_nodes as f64);
+    let modes = form.along(&x);
+    let coefficient = bounded(coefficient, [&modes[0], &modes[1]], &spread, inverse_volume, 1.0);
     let resist = by_mass * coefficient * density * sound * area;
     let mut taken = L::splat(step.dt) * resist * modes_square;
     let mut check = energy + pressure + viscosity + modes_square + stress.sum();

@@ -15,7 +15,7 @@ use crate::{
             offer_faults,
             stress::Stressed,
         },
-        hourglass::{Amplitudes, amplitude},
+        hourglass::{Amplitudes, OF_SUMS, amplitude, bounded},
         modes::{Gradient, Modes, corner_values, modes_of},
         place::Nodal,
         vector::{Tensor, Vector},
@@ -191,8 +191,13 @@ pub(super) fn compute<L: Lane>(
         f: amplitude(&v.f, &gradient, &mid.f),
         g: amplitude(&v.g, &gradient, &mid.g),
     };
-    let resist =
-        if failed { Scalar(2.0 * laws.hourglass.failed) * density * sound * end.area } else { Scalar(0.0) };
+    let mut resist = Scalar(0.0);
+    if failed {
+        let inverse_volume = end.inverse_by_64 * Scalar(64.0);
+        let modes = [&x.d, &x.e, &x.f, &x.g];
+        let twice = bounded(Scalar(2.0 * laws.hourglass.failed), modes, &end.spread, inverse_volume, OF_SUMS);
+        resist = twice * density * sound * end.area;
+    }
     let taken = Scalar(step.dt / 8.0) * resist * q.square();
 
     // Forces on the modes, and the narrowest point.
