@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::{
     deck_file::{Error, gather_deck, warn},
-    output,
+    progress,
     shell::{print, tell},
 };
 
@@ -115,7 +115,7 @@ fn digits(x: f64) -> String {
 
 /// A time that a person waits for.
 fn span(seconds: f64) -> String {
-    if seconds < 1.0 { "less than 1 s".to_owned() } else { output::span(seconds) }
+    if seconds < 1.0 { "less than 1 s".to_owned() } else { progress::span(seconds) }
 }
 
 fn size(bytes: u64) -> String {

@@ -26,7 +26,7 @@ use arguments::{ClientArgs, MASTER, SubmitArgs};
 use crate::{
     deck_file::{self, doubt, gather_deck, warn},
     machine::host_name,
-    output::span,
+    progress::span,
     results::{Folder, SUMMARY, Summary, Units, create_anew, summary::significant, temporary_of},
     shell::{obeys, print, quoted, tell},
 };

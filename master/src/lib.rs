@@ -57,6 +57,7 @@ pub mod picture;
 pub mod places;
 pub mod processes;
 pub mod program;
+pub mod progress;
 pub mod quality;
 pub mod queue;
 pub mod reading;

@@ -21,7 +21,7 @@ use serde::Serialize;
 use super::surface::Skin;
 use crate::{
     event::{Deal, Progress, Proved},
-    output::Begun,
+    progress::Begun,
     results::{Units, history::HistoryRow},
 };
 

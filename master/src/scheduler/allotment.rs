@@ -22,7 +22,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use crate::{
     footprint::{self, Bearer},
-    output::span,
+    progress::span,
 };
 
 pub use slots::Threads;
