@@ -84,6 +84,7 @@ pub(crate) struct Pores {
 }
 
 /// A state of the pores.
+#[derive(Debug)]
 pub(crate) struct Compacted<L> {
     /// `alpha`.
     pub distension: L,
@@ -170,15 +171,17 @@ impl Pores {
     }
 
     /// The distension at a relative volume and an energy, from a share of pores crushed so far; `near` is a pressure to begin with. Pressure falls
-    /// with alpha on the curve of the pores and rises with it on that of the solid, so there is one root; it lies between the pressure of the
-    /// solid without pores and that which it would have with the pores that this pressure leaves.
+    /// with alpha on the curve of the pores and rises with it on that of the solid, so there is one root. It is above the pressure of the solid
+    /// without pores and, where that is less than leaves none, below it; and it lies between nothing and the pressure with the pores that no pressure
+    /// leaves. Farther off the line of the solid is beyond its poles and means nothing.
     #[inline(always)]
     pub fn compacted<L: Lane>(&self, v: L, energy: L, share: L, near: L) -> Compacted<L> {
-        let (one, half) = (L::splat(1.0), L::splat(0.5));
+        let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
         let stopped = self.stopped(share);
-        let (mut low, _) = self.pressure(one, v, energy);
-        let (widest, _) = self.distension(low, &stopped);
-        let (mut high, _) = self.pressure(widest, v, energy);
+        let (solid, _) = self.pressure(one, v, energy);
+        let (at_rest, _) = self.pressure(self.distension(zero, &stopped).0, v, energy);
+        let mut low = at_rest.min(zero).max(solid);
+        let mut high = at_rest.max(zero).min(L::splat(self.compaction_pressure)).max(solid);
         let mut p = near.max(low).min(high);
         let mut open = low.less(high);
         let mut last = high - low;
@@ -287,6 +290,38 @@ pub(crate) mod tests {
         // What has been compacted goes back along the line of the solid, into tension.
         let (p, alpha, _) = at(0.67, 0.0, 1.0);
         assert!(p < 0.0 && alpha == 1.0, "{p} {alpha}");
+    }
+
+    #[test]
+    fn the_pressure_is_the_root_of_both_curves_whatever_gamma() {
+        for (density, speed, gamma) in
+            [(5500.0, 800.0, 2.17), (3000.0, 1500.0, 2.17), (2000.0, 1000.0, 2.17), (7000.0, 1200.0, 2.77)]
+        {
+            let law = Porous {
+                solid_density: 7850.0,
+                c0: 4569.0,
+                s: 1.49,
+                gamma,
+                porous_speed: speed,
+                crush_pressure: 0.05e9,
+                ..LAW
+            };
+            assert_eq!(law.fault(density), None);
+            let pores = Pores::new(&law, density);
+            let mut share = 0.0;
+            for n in -40..=500 {
+                let v = 1.0 - 0.001 * f64::from(n);
+                let found = pores.compacted(Scalar(v), Scalar(0.0), Scalar(share), Scalar(0.0));
+                let (p, _) = pores.pressure(found.distension, Scalar(v), Scalar(0.0));
+                let (wanted, _) = pores.distension(p, &pores.stopped(Scalar(share)));
+                assert!(
+                    (found.distension.0 / wanted.0 - 1.0).abs() < 1e-9,
+                    "{density}, {v}: {found:?}, {p:?}"
+                );
+                assert!(n != 0 || p.0.abs() < 1.0, "{density}: {p:?} at rest");
+                share = found.share.0;
+            }
+        }
     }
 
     #[test]
