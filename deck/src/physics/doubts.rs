@@ -98,7 +98,9 @@ fn values(model: &Model, measured: &[Measured], units: &Units, doubts: &mut Vec<
             ));
         }
         let sound = material.sound_speed() * speed_unit;
-        if known.contains(&density) && !material.is_gas() && !SOUNDS.contains(&sound) {
+        // Honeycomb has the moduli of its solid, the density of its cells, and waves of neither.
+        let is_cellular = matches!(material.strength, Strength::Honeycomb(..));
+        if !is_cellular && known.contains(&density) && !material.is_gas() && !SOUNDS.contains(&sound) {
             doubts.push(format!(
                 "part \"{}\": waves run at {} m/s by its moduli and density, from 20 to 25000 m/s in any solid or liquid; check the moduli: \
                  stresses in {name} are in {}",
