@@ -7,6 +7,7 @@ mod bits;
 mod blasts;
 mod bodies;
 mod book;
+mod crushing;
 mod documents;
 mod eight_points;
 mod erosion;

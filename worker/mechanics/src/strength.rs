@@ -213,6 +213,17 @@ pub(crate) struct Around<L> {
     pub dt: L,
 }
 
+impl<L: Lane> Around<L> {
+    /// A bound of the strain of this step along any direction; of one direction alone it is that.
+    #[inline(always)]
+    pub fn shortened(&self) -> L {
+        (self.volume_rate * self.dt).abs().mul_add(L::splat(1.0 / 3.0), self.strain.increment)
+    }
+}
+
+/// How many steps like this one a law looks ahead along its curve for the stiffness that holds the next one down, which may be longer.
+pub(crate) const AHEAD: f64 = 3.0;
+
 /// What a law with history variables keeps of an element, and what it asks of the pressure of this step.
 #[derive(Clone, Copy)]
 pub(crate) struct Memory<L> {
@@ -230,6 +241,8 @@ pub(crate) struct Memory<L> {
     pub least_pressure: L,
     /// Added to the stiffness of waves that the equation of state and [`StrengthLaw::shear`] make (stress).
     pub added_stiffness: L,
+    /// What of the whole stiffness no wave meets now, and only the step reckons with (stress).
+    pub idle_stiffness: L,
 }
 
 impl<L: Lane> Memory<L> {
@@ -245,6 +258,7 @@ impl<L: Lane> Memory<L> {
             added_pressure: zero,
             least_pressure: zero,
             added_stiffness: zero,
+            idle_stiffness: zero,
         }
     }
 }

@@ -7,7 +7,7 @@
 //! J. O. Hallquist, LS-DYNA theoretical manual (1998), material model 63.
 
 use super::{
-    Around, Deviator, Hardening, History, Memory, StrengthLaw,
+    AHEAD, Around, Deviator, Hardening, History, Memory, StrengthLaw,
     curve::Curve,
     finite_strain::Symmetric,
     principal::{along, principal},
@@ -97,8 +97,9 @@ impl StrengthLaw for Crushable {
         let lost = L::splat(1.0) - around.relative_volume;
         memory.variables[0] = memory.variables[0].max(lost);
         let [crush, slope, _] = self.curve.at(lost);
-        // Locked foam is as stiff as its curve.
-        memory.added_stiffness = slope;
+        // Locked foam is as stiff as its curve, which the step must know before a corner of the curve is there.
+        let [_, soon, _] = self.curve.at(around.shortened().mul_add(L::splat(AHEAD), lost));
+        memory.added_stiffness = slope.max(soon);
         let tension = L::splat(self.law.tension);
         let least = -crush;
         // What the bounds change is added to the trial, which elsewhere stays as it is.

@@ -187,7 +187,7 @@ impl StrengthLaw for Cells {
         let before = axes.stress_before(&trial, around, &strain, self.shear);
         let lost = one - around.relative_volume;
         let share = (lost * L::splat(1.0 / (1.0 - self.law.solid_volume))).max(zero).min(one);
-        let [bound, ..] = self.curve.at(lost.max(zero));
+        let [bound, slope, _] = self.curve.at(lost.max(zero));
         let is_solid = around.relative_volume.less_equal(L::splat(self.law.solid_volume));
         let solid = self.solid(&before, &strain);
         let mut stress = before;
@@ -199,6 +199,10 @@ impl StrengthLaw for Cells {
             stress[i] = L::select(is_solid, solid[i], grown.min(bound).max(-bound));
             i += 1;
         }
+        // The solid holds the step down from the start, and what unloads grows towards it. What is crushed meets the waves of the cells.
+        let met = slope + L::splat(self.law.young_a.max(self.law.young_b).max(self.law.young_c));
+        let whole = L::splat((4.0 / 3.0 * self.shear) + self.bulk);
+        memory.idle_stiffness = L::select(is_solid, zero, (whole - met).max(zero));
         axes.answer(stress, &trial, around, memory)
     }
 }

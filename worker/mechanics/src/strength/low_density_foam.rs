@@ -9,7 +9,7 @@
 //! same code's hysteretic unloading of foams by rate.
 
 use super::{
-    Around, Deviator, Hardening, History, Memory, StrengthLaw,
+    AHEAD, Around, Deviator, Hardening, History, Memory, StrengthLaw,
     curve::Curve,
     finite_strain::{COLUMNS, Symmetric},
     principal::{along, principal},
@@ -127,7 +127,11 @@ impl StrengthLaw for LowDensity {
         let mut axis = 0;
         while axis < 3 {
             let stretch = squares[axis].max(zero).sqrt() * side;
-            let [nominal, slope, stored] = self.nominal(stretch);
+            let [nominal, here, stored] = self.nominal(stretch);
+            // The step must know the stiffness behind a corner of the curve before it is there.
+            let [_, soon, _] =
+                self.nominal(around.shortened().neg_mul_add(L::splat(AHEAD) * stretch, stretch));
+            let slope = here.max(soon);
             let share = stretch * inverse;
             stress[axis] = nominal * share;
             energy = energy + stored;
@@ -142,6 +146,8 @@ impl StrengthLaw for LowDensity {
         // What is pressed by a hair may be pulled by one in the next cycle.
         let young = L::splat(self.law.young);
         memory.added_stiffness = stiffest.max(young);
+        // That of the equation of state and the shear modulus is young once more.
+        memory.idle_stiffness = young;
         let lost = 1.0 - self.law.hysteresis;
         if lost > 0.0 {
             let some = zero.less(greatest);

@@ -92,7 +92,11 @@ impl<L: Lane> Compressed<L> {
             stiffness = stiffness + memory.added_stiffness;
         }
         let sound_square = stiffness * relative_volume * L::splat(1.0 / laws.density);
-        let sound = sound_square.sqrt();
+        let mut sound = sound_square.sqrt();
+        if S::REMEMBERS {
+            let met = (stiffness - memory.idle_stiffness).max(zero) / stiffness;
+            sound = sound * met.sqrt();
+        }
 
         // 5. Artificial viscosity in compression.
         let density = L::splat(laws.density) * (initial_volume * change.inverse_volume);

@@ -195,6 +195,7 @@ pub(super) unsafe fn slots<L: Lane, S: StrengthLaw, F: FailureLaw>(
             memory.least_pressure = quarter.mul_add(of_point.least_pressure, memory.least_pressure);
             memory.distension = quarter.mul_add(of_point.distension, memory.distension);
             memory.stretch = quarter.mul_add(of_point.stretch, memory.stretch);
+            memory.idle_stiffness = quarter.mul_add(of_point.idle_stiffness, memory.idle_stiffness);
             memory.added_stiffness = memory.added_stiffness.max(of_point.added_stiffness);
         }
         points[g] = Point {
