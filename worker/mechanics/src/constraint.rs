@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     load::{Curve, Drive, Span},
-    vectors::{cross, turn, turned},
+    vectors::{cross, dot, minus, turn, turned},
 };
 
 /// What acts on a node alone: prescribed velocities, walls, forces. A node's constraint is the same on every holder.
@@ -57,7 +57,8 @@ impl Constraint {
     pub fn spin(&self, curves: &[Curve], time: f64, dt: f64) -> [Option<f64>; 3] {
         let mut spin = [None; 3];
         if let Some(circle) = self.circle {
-            spin[usize::from(circle.axis)] = circle.rate.prescribed_for(curves, time, dt);
+            let rate = circle.rate.prescribed_for(curves, time, dt);
+            spin[usize::from(circle.axis)] = rate.map(|rate| circle.chord_rate(rate, dt));
         }
         if self.clamp_span.holds(0.5f64.mul_add(dt, time)) {
             for axis in (0..3).filter(|axis| self.clamped >> axis & 1 == 1) {
@@ -97,6 +98,21 @@ pub struct Circle {
 }
 
 impl Circle {
+    /// How fast its chords turn over a step `dt` (radians per time), `2 tan(rate dt/2)/dt`: the spin that an element sees in the middle of the step
+    /// whose nodes all go along theirs.
+    pub fn chord_rate(&self, rate: f64, dt: f64) -> f64 {
+        if dt == 0.0 {
+            return rate;
+        }
+        let axis = usize::from(self.axis);
+        let (mut spin, mut before) = ([0.0; 3], [0.0; 3]);
+        spin[axis] = rate;
+        before[(axis + 1) % 3] = 1.0;
+        let after = turned(&turn(&[1.0, 0.0, 0.0, 0.0], spin, dt), before);
+        let twice_middle: [f64; 3] = std::array::from_fn(|a| after[a] + before[a]);
+        2.0 * cross(twice_middle, minus(after, before))[axis] / (dot(twice_middle, twice_middle) * dt)
+    }
+
     /// The velocity that takes a point at `x` along its circle in a step `dt`: the chord over the step.
     pub fn velocity(&self, rate: f64, x: [f64; 3], dt: f64) -> [f64; 3] {
         let axis = usize::from(self.axis);
@@ -121,6 +137,16 @@ pub const MAX_WALLS: usize = 32;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn chords_turn_by_twice_the_tangent_of_half_the_angle() {
+        for (axis, rate, dt) in [(0, 3.0, 0.1), (1, -2.0, 0.7), (2, 1e4, 1e-6)] {
+            let circle = Circle { axis, point: [1e3, 0.0, 0.0], rate: Drive::constant(rate) };
+            let wanted = 2.0 * (0.5 * rate * dt).tan() / dt;
+            assert!((circle.chord_rate(rate, dt) / wanted - 1.0).abs() < 1e-12, "{rate} {dt}");
+            assert_eq!(circle.chord_rate(rate, 0.0), rate);
+        }
+    }
 
     #[test]
     fn a_node_on_a_circle_stays_on_it_whatever_the_step() {
