@@ -71,10 +71,14 @@ impl Curve {
             }
             points[i] = [strain[i], stress[i], slope, before];
         }
+        if n_points > 1 {
+            points[n_points - 1][2] = points[n_points - 2][2];
+        }
         Self { n_points, points }
     }
 
-    /// Stress, slope and the area from 0 on, at a strain of 0 or more; beyond the last point the stress stays.
+    /// Stress, slope and the area from 0 on, at a strain of 0 or more; beyond the last point the last line goes on, because what is compacted
+    /// grows no softer.
     #[inline(always)]
     pub fn at<L: Lane>(&self, strain: L) -> [L; 3] {
         let (mut stress, mut slope, mut area) = (L::splat(self.points[0][1]), L::splat(0.0), L::splat(0.0));
@@ -107,7 +111,7 @@ mod tests {
             (0.25, [2.5, 2.0, 0.5625]),
             (0.5, [3.0, 32.0, 1.25]),
             (0.625, [7.0, 32.0, 1.875]),
-            (1.0, [11.0, 0.0, 3.0 + 2.75]),
+            (1.0, [19.0, 32.0, 3.0 + 3.75]),
         ] {
             assert_eq!(curve.at(Scalar(strain)).map(|x| x.0), wanted, "{strain}");
         }
