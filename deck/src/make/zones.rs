@@ -38,9 +38,7 @@ pub(super) fn overlaps(
     for ((a, b), worst) in found {
         let line = log.line(parts[a].at, parts[b].at);
         let id = assembly.mesh.node_ids[worst.node as usize];
-        let how = if worst.distance <= 1e-9 * gap {
-            format!("node {id} on the surface of the other part")
-        } else if worst.inside {
+        let how = if worst.inside {
             format!("node {id} inside the other part")
         } else {
             format!("node {id} only {} from the other part", short(worst.distance))

@@ -215,7 +215,8 @@ mod tests {
             Constraint { clamped: 0b101, ..Constraint::default() },
             Constraint { clamped: 0b001, circle: Some(circle), ..Constraint::default() },
         ];
-        let held = [[None; 3], [Some(0.0), None, Some(0.0)], [Some(0.0), Some(-4.5), None]];
+        let turns = Some(circle.chord_rate(-4.5, 3e-4));
+        let held = [[None; 3], [Some(0.0), None, Some(0.0)], [Some(0.0), turns, None]];
         let quantum = Quantum::for_reference(1e3, 42);
         for factor in [None, Some(0.9)] {
             let relaxation = factor.map(|factor| Relaxation { factor, rate: 0.0, until: 1.0 });
