@@ -8,6 +8,9 @@
 //!   `p2 = a E/v + (b E/(v w) + A mu exp(-beta (v - 1))) exp(-alpha (v - 1)^2)`;
 //! - stretched, between both: a line in E from p1 to p2, with E the energy itself and not those of the ends.
 //!
+//! The parabola of p1 turns at `mu = -A/(2 B)`. What is stretched beyond that keeps its least pressure: on the other branch cold water, whose B is six
+//! times its A, would be pushed apart from v = 1.2 on.
+//!
 //! The pressure is no line in the energy, so the kernel gets the tangent at the energy with which the step begins, less the work of its pressure: what it
 //! leaves out is of the second order in the heat of one step, and does not add up, as the next tangent begins on the surface.
 
@@ -53,6 +56,8 @@ pub(crate) struct Vapour {
     inverse_energy0: f64,
     incipient: f64,
     inverse_range: f64,
+    /// Where the parabola of mu has its least pressure.
+    turn: f64,
 }
 
 /// A pressure and its slopes by energy and by relative volume.
@@ -83,6 +88,7 @@ impl Vapour {
             inverse_energy0: 1.0 / (law.energy0 * density),
             incipient: law.incipient_energy * density,
             inverse_range: 1.0 / ((law.complete_energy - law.incipient_energy) * density),
+            turn: if law.quadratic > 0.0 { -0.5 * law.bulk / law.quadratic } else { f64::MIN },
         }
     }
 
@@ -102,11 +108,11 @@ impl Vapour {
         let bent = two * b * (w - one) * share * share;
 
         let gamma = b.mul_add(share, a);
-        let quadratic = L::splat(law.quadratic);
+        let (quadratic, least) = (L::splat(law.quadratic), mu.max(L::splat(self.turn)));
         let dense = Surface {
-            p: (gamma * inverse).mul_add(energy, quadratic.mul_add(mu, bulk) * mu),
+            p: (gamma * inverse).mul_add(energy, quadratic.mul_add(least, bulk) * least),
             by_energy: (cold * share).mul_add(share, vapour),
-            by_volume: -(square * (gamma + bent).mul_add(energy, (two * quadratic).mul_add(mu, bulk))),
+            by_volume: -(square * (gamma + bent).mul_add(energy, (two * quadratic).mul_add(least, bulk))),
         };
         let share_of_vapour =
             ((energy - L::splat(self.incipient)) * L::splat(self.inverse_range)).max(zero).min(one);
@@ -233,6 +239,22 @@ mod tests {
             let line = law.line_about(Scalar(v), Scalar(1.0), Scalar(energy));
             let (found, wanted) = (line.pressure(Scalar(energy)).0, published(v, energy));
             assert!((found - wanted).abs() < 1e-12 * (wanted.abs() + 1e9), "{v} {energy}: {found} {wanted}");
+        }
+    }
+
+    /// Water has a B of six times A.
+    #[test]
+    fn what_is_cold_and_stretched_pulls_however_far() {
+        let (bulk, quadratic) = (2.18e9, 13.25e9);
+        let law = Vapour::new(&Tillotson { bulk, quadratic, ..LAW }, 1000.0);
+        for v in [1.01, 1.05, 1.08, 1.2, 1.5, 3.0, 30.0] {
+            let mu = 1.0 / v - 1.0;
+            let wanted =
+                if v < 1.089 { bulk * mu + quadratic * mu * mu } else { -0.25 * bulk * bulk / quadratic };
+            let line = law.line_about(Scalar(v), Scalar(1.0), Scalar(0.0));
+            let found = line.pressure(Scalar(0.0)).0;
+            assert!((found - wanted).abs() < 1e-12 * bulk, "{v}: {found} {wanted}");
+            assert!(line.slope_a.0 <= 1e-6 * bulk, "{v}: {}", line.slope_a.0);
         }
     }
 

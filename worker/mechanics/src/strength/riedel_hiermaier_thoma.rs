@@ -264,8 +264,9 @@ impl Concrete {
             }
         }
         let cap = crushed.mul_add(span, first);
-        // Exactly that where pores collapse, so that the cap closes the elastic surface.
-        Compacted { pressure: pressure.min(cap), stiffness, crushed, cap }
+        // Exactly that where pores collapse, so that the cap closes the elastic surface. Where none are left the solid is pressed further.
+        let pressure = L::select(crushed.less(one), pressure.min(cap), pressure);
+        Compacted { pressure, stiffness, crushed, cap }
     }
 
     /// The failure surface on the compressive meridian, over f, at a pressure over f and a factor of the rate.

@@ -91,7 +91,10 @@ impl Published {
                 if collapses { self.crushed = middle } else { above = middle }
             }
         }
-        let whole = pressure_at(open(self.crushed), volume, energy).min(top(self.crushed));
+        let mut whole = pressure_at(open(self.crushed), volume, energy);
+        if self.crushed < 1.0 {
+            whole = whole.min(top(self.crushed));
+        }
         let cap = top(self.crushed) / 35e6;
 
         for i in 0..3 {
@@ -196,6 +199,13 @@ fn uniaxial_strain_follows_the_published_equations_there_and_back() {
     let (_, published) = follow(&lengths.map(|x| [x, 1.0, 1.0]), 4000);
     assert!(published.crushed == 1.0 && published.damage == 1.0, "{published:?}");
     assert_eq!(published.pressure, 0.0);
+}
+
+#[test]
+fn without_pores_the_pressure_is_that_of_the_solid() {
+    let (_, published) = follow(&[[0.7, 1.0, 1.0]], 4000);
+    let solid = pressure_at(1.0, 0.7, 0.0);
+    assert!(published.crushed == 1.0 && published.pressure > 0.99 * solid && solid > 8e9, "{published:?}");
 }
 
 #[test]
