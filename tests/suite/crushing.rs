@@ -29,20 +29,19 @@ fn honeycomb_is_crushed_at_its_curve_and_not_at_the_waves_of_its_solid() {
     // Losses of volume from 0.19 to 0.375.
     let (found, curve) = (mean_stress(&solved, 0.75, 900.0, 15.0), 1.27e-3);
     println!("{found:e} GPa, {curve:e} by the curve");
-    // 2.68e-3 with the waves of the solid, of which 1.4e-3 are viscosity.
+    // 2.68e-3 with the waves of the solid.
     assert!(found > 0.97 * curve && found < 1.25 * curve, "{found:e}");
 }
 
 #[test]
 fn foam_goes_through_the_corners_of_its_curve() {
-    for (strength, young) in [
-        ("type = \"crushable-foam\", young = 0.01, tension = 0.0001", 0.01),
-        ("type = \"low-density-foam\", young = 0.01, tension = 0.001, hysteresis = 1.0, shape = 1.0", 0.01),
+    for strength in [
+        "type = \"crushable-foam\", tension = 0.0001",
+        "type = \"low-density-foam\", tension = 0.001, hysteresis = 1.0, shape = 1.0",
     ] {
         let material = format!(
-            "density = 6e-8, eos = {{ type = \"linear\", bulk = {:?} }}, strength = {{ {strength}, \
-             points = [[0, 0.0], [0.02, 0.0002], [0.5, 0.0003], [0.7, 0.001], [0.8, 0.005], [0.9, 0.05]] }}",
-            young / 3.0
+            "density = 6e-8, eos = {{ type = \"linear\", bulk = 0.0033333333333333335 }}, strength = {{ {strength}, young = 0.01, \
+             points = [[0, 0.0], [0.02, 0.0002], [0.5, 0.0003], [0.7, 0.001], [0.8, 0.005], [0.9, 0.05]] }}"
         );
         let solved = crushed(&material, "size = [10, 10, 10], cells = [2, 2, 2]", -5.0, 1.7);
         assert!(solved.rows.last().is_some_and(|row| row.time > 1.69 && row.error.abs() < 1e-3));
@@ -60,7 +59,7 @@ fn porous_iron_that_is_pushed_is_pressed_no_more_than_crushing_takes() {
         let solved = crushed(&material, "size = [10, 10, 10], cells = [2, 2, 2]", -5.0, 0.05);
         let found = mean_stress(&solved, 0.04, 100.0, 5.0);
         println!("{density:e}: {found} GPa");
-        // 26 GPa where its root was looked for beyond the pole of the shock line.
+        // 25.8 GPa for the first, with its sides held, where its root was looked for beyond the pole of the shock line.
         assert!((0.001..0.1).contains(&found), "{density:e}: {found}");
     }
 }

@@ -294,7 +294,7 @@ impl<L: Lane> Amplitudes<L> {
 /// The scale of [`bounded`] for `512 S` and modes that are plain sums over eight corners, whose patterns are as long as the root of 8.
 pub(crate) const OF_SUMS: f64 = 1.0 / 4096.0;
 
-/// Twice the coefficient of viscous control that an element has for one that its part has, twice as well. Forces reach the nodes by the
+/// The coefficient of viscous control that an element has where its part has this one, both twice as large. Forces reach the nodes by the
 /// patterns h_m of the modes (here of length 1) less what of these is linear, `h_m - x_m . B / V`, with the modes x_m of the corners.
 /// `e = sum_m x_m . S x_m / V^2` is the square of that second part: nothing in a parallelepiped, little in a usual mesh, and thousands in an
 /// element that is squashed and bent. So many times as fast would the control damp its nodes, which beyond a step drives them:

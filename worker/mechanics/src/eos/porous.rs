@@ -171,9 +171,9 @@ impl Pores {
     }
 
     /// The distension at a relative volume and an energy, from a share of pores crushed so far; `near` is a pressure to begin with. Pressure falls
-    /// with alpha on the curve of the pores and rises with it on that of the solid, so there is one root. It is above the pressure of the solid
-    /// without pores and, where that is less than leaves none, below it; and it lies between nothing and the pressure with the pores that no pressure
-    /// leaves. Farther off the line of the solid is beyond its poles and means nothing.
+    /// with alpha on the curve of the pores and rises with it on that of the solid, so there is one root. It lies between nothing and the pressure with
+    /// the pores that are open under no pressure; it is no lower than the pressure of the solid without pores, and no higher than `p_s` unless that is.
+    /// Farther off, the line of the solid is beyond its pole and means nothing.
     #[inline(always)]
     pub fn compacted<L: Lane>(&self, v: L, energy: L, share: L, near: L) -> Compacted<L> {
         let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
