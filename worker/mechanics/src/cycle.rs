@@ -33,8 +33,9 @@ use crate::{
     joint::{JointVote, Mechanism},
     lanes::Width,
     load::face,
-    nodes::{Advance, share_before},
+    nodes::Advance,
     setup::Setup,
+    time_step::TimeStep,
     vote::{Gone, Vote},
     wall::{self, Pose, WallVote},
 };
@@ -291,18 +292,12 @@ impl Domain {
         self.move_bodies(pushes, dt_previous, dt);
         self.gauges_before = self.read_gauges();
         let setup = &self.setup;
+        let (time, cycle, loads, quanta) = (self.time, self.cycle, &setup.loads, self.quanta);
+        let step = TimeStep { dt_previous, dt, time, cycle, loads, quanta };
+        let share_before = step.share_before();
         wall::poses(&setup.walls, &setup.loads.curves, self.time, dt, free_walls, &mut self.poses);
-        let advance = Advance {
-            dt_previous,
-            dt,
-            time: self.time,
-            cycle: self.cycle,
-            constraints: &setup.constraints,
-            walls: &setup.walls,
-            poses: &self.poses,
-            loads: &setup.loads,
-            quanta: self.quanta,
-        };
+        let advance =
+            Advance { step, constraints: &setup.constraints, walls: &setup.walls, poses: &self.poses };
         let (width, bodies) = (self.width, Bodies { held: &self.bodies, of: &setup.bodies });
         let (of_groups, contact) = (self.groups.totals(), &self.contact);
         let of_block = |held_block: &mut HeldBlock| {
@@ -337,6 +332,6 @@ impl Domain {
             self.vote.released = Some(self.spring_energies(dt, meter));
         }
         self.cycle += 1;
-        Ok(self.finish_vote(share_before(dt_previous, dt)))
+        Ok(self.finish_vote(share_before))
     }
 }

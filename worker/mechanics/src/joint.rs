@@ -11,7 +11,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    rigid::{Advance, Body, Free, Impulse, State},
+    rigid::{Body, Free, Impulse, State},
+    time_step::TimeStep,
     vectors::{cross, dot, turned},
 };
 
@@ -162,7 +163,7 @@ pub struct Mechanism {
 
 /// Bodies that are to be moved from `t_n` to `t_{n+1}`.
 pub struct Moving<'a> {
-    pub advance: &'a Advance<'a>,
+    pub step: &'a TimeStep<'a>,
     pub bodies: &'a [Body],
     pub states: &'a [State],
     pub free: &'a [Free],
@@ -240,7 +241,7 @@ impl Island {
             for &body in &self.bodies {
                 let b = body as usize;
                 let (body, free) = (&moving.bodies[b], &moving.free[b]);
-                states[b] = moving.advance.moved(body, free, &impulses[b], &moving.states[b]);
+                states[b] = moving.step.moved(body, free, &impulses[b], &moving.states[b]);
             }
             for (violation, row) in violations.iter_mut().zip(&rows) {
                 let ends = &joints[row.joint as usize].ends;
@@ -252,7 +253,7 @@ impl Island {
                 break;
             }
             before = worst;
-            let mut change: Vec<f64> = violations.iter().map(|g| -g / moving.advance.dt).collect();
+            let mut change: Vec<f64> = violations.iter().map(|g| -g / moving.step.dt).collect();
             system.solve(&mut change);
             for ((held, row), change) in held.iter_mut().zip(&rows).zip(change) {
                 *held += change;
@@ -264,7 +265,7 @@ impl Island {
                 }
             }
         }
-        let per_time = 1.0 / moving.advance.half_steps();
+        let per_time = 1.0 / moving.step.half_steps();
         for ((row, held), violation) in rows.iter().zip(held).zip(violations) {
             let joint = &joints[row.joint as usize];
             let vote = &mut votes[row.joint as usize];
@@ -347,7 +348,7 @@ impl System {
                 [0, 1].map(|e| match ends[e] {
                     Some(b) => {
                         let b = b as usize;
-                        moving.advance.answer(&moving.bodies[b], &moving.states[b], &row.on[e])
+                        moving.step.answer(&moving.bodies[b], &moving.states[b], &row.on[e])
                     }
                     None => Impulse::default(),
                 })

@@ -53,6 +53,7 @@ pub mod setup;
 pub(crate) mod spin;
 pub mod state;
 pub mod strength;
+pub mod time_step;
 mod vectors;
 pub mod vote;
 pub mod wall;

@@ -12,9 +12,9 @@ use crate::{
     constraint::Constraint,
     contact::Extent,
     element::vector::Vector,
-    exact::{Quanta, rounded},
+    exact::rounded,
     lanes::{Lane, SET, Width, dispatch::Task},
-    load::{Drive, Loads},
+    time_step::TimeStep,
     wall::{Pose, RigidWall, WallVote},
     work::{self, Work},
 };
@@ -68,24 +68,14 @@ pub struct Nodes<'a> {
 
 /// One step of time for nodes.
 pub struct Advance<'a> {
-    /// `dt_{n-1}` (time).
-    pub dt_previous: f64,
-    /// `dt_n` (time).
-    pub dt: f64,
-    /// `t_n` (time).
-    pub time: f64,
-    /// `n`.
-    pub cycle: u64,
+    /// The step itself.
+    pub step: TimeStep<'a>,
     /// What acts on single nodes; entry 0 is nothing.
     pub constraints: &'a [Constraint],
     /// All walls; a node's constraint says which it feels.
     pub walls: &'a [RigidWall],
     /// Where the walls are and how they move in this step.
     pub poses: &'a [Pose],
-    /// Curves, forces on nodes, gravity, relaxation.
-    pub loads: &'a Loads,
-    /// Quanta of the sums.
-    pub quanta: Quanta,
 }
 
 /// What the nodes say of a step: exact sums over booked nodes, each term rounded to its quantum, and extremes over
@@ -134,57 +124,37 @@ impl Task for Integration<'_, '_> {
 impl Advance<'_> {
     /// Gravity and relaxation in this step, if there are any.
     fn body(&self) -> Option<Body> {
-        let loss = self.loss();
-        if self.loads.gravity.is_none() && loss == 0.0 {
+        let loss = self.step.loss();
+        if self.step.loads.gravity.is_none() && loss == 0.0 {
             return None;
         }
-        let gain = self.loads.gravity.map_or([0.0; 3], |gravity| {
-            let scale = self.half_steps() * self.mean(&gravity.drive);
+        let gain = self.step.loads.gravity.map_or([0.0; 3], |gravity| {
+            let scale = self.step.half_steps() * self.step.mean(&gravity.drive);
             gravity.acceleration.map(|g| g * scale)
         });
         Some(Body { gain, loss })
     }
 
-    /// From `t_{n-1/2}` to `t_{n+1/2}` (time).
-    pub(crate) fn half_steps(&self) -> f64 {
-        0.5 * (self.dt_previous + self.dt)
-    }
-
-    /// The mean of a load from `t_{n-1/2}` to `t_{n+1/2}`.
-    pub(crate) fn mean(&self, drive: &Drive) -> f64 {
-        drive.mean_around(&self.loads.curves, self.time, [self.dt_previous, self.dt])
-    }
-
-    /// Share of the velocity that relaxation takes in this step.
-    pub(crate) fn loss(&self) -> f64 {
-        self.loads.loss(self.time, self.half_steps())
-    }
-
-    /// Share of the time from `t_{n-1/2}` to `t_{n+1/2}` that lies before `t_n`.
-    pub(crate) fn share_before(&self) -> f64 {
-        share_before(self.dt_previous, self.dt)
-    }
-
     /// The force on a node that brings it to `target` in this step, whatever gravity and relaxation do.
     pub(crate) fn leading(&self, x: [f64; 3], v: [f64; 3], mass: f64, target: [f64; 3]) -> [f64; 3] {
-        let half_steps = self.half_steps();
-        if self.dt == 0.0 || half_steps == 0.0 {
+        let half_steps = self.step.half_steps();
+        if self.step.dt == 0.0 || half_steps == 0.0 {
             return [0.0; 3];
         }
         let Body { gain, loss } = self.body().unwrap_or(Body { gain: [0.0; 3], loss: 0.0 });
         std::array::from_fn(|a| {
-            let change = (target[a] - x[a]) / self.dt - v[a];
+            let change = (target[a] - x[a]) / self.step.dt - v[a];
             mass / half_steps * (change - (gain[a] - loss * v[a]))
         })
     }
 
     /// The moment on a node of shells that turns it at `target` after this step, whatever relaxation does.
     pub(crate) fn turning(&self, spin: [f64; 3], inertia: f64, target: [f64; 3]) -> [f64; 3] {
-        let half_steps = self.half_steps();
+        let half_steps = self.step.half_steps();
         if half_steps == 0.0 {
             return [0.0; 3];
         }
-        let loss = self.loss();
+        let loss = self.step.loss();
         std::array::from_fn(|a| inertia / half_steps * (target[a] - spin[a] + loss * spin[a]))
     }
 
@@ -248,11 +218,11 @@ impl Advance<'_> {
         tally: &mut Tally<L>,
     ) {
         let zero = L::splat(0.0);
-        let dt = L::splat(self.dt);
+        let dt = L::splat(self.step.dt);
         // SAFETY: the caller's promise.
         let (x, old, force, mass) =
             unsafe { (load(nodes.x, at), load(nodes.v, at), load(nodes.f, at), L::load(nodes.mass, at)) };
-        let scale = L::splat(0.5 * (self.dt_previous + self.dt)) / mass;
+        let scale = L::splat(self.step.half_steps()) / mass;
         let mut new: Vector<L> = force.mul_add(scale, &old);
         let mut change = splat::<L>(0.0);
         if let Some(Body { gain, loss }) = body {
@@ -288,20 +258,20 @@ impl Advance<'_> {
         }
 
         let booked = L::mask(u32::from(set.booked));
-        let energy = L::splat(self.quanta.energy.magic());
+        let energy = L::splat(self.step.quanta.energy.magic());
         if body.is_some() {
             let impulse = change.scaled(mass);
-            let quantum = self.quanta.energy.dithered(self.cycle);
-            let halves = work::halves([impulse.dot(&old), impulse.dot(&new)], self.share_before());
+            let quantum = self.step.dithered();
+            let halves = work::halves([impulse.dot(&old), impulse.dot(&new)], self.step.share_before());
             for (sum, half) in tally.body_work.iter_mut().zip(halves) {
                 *sum = *sum + L::select(booked, quantum.round_lanes(half), zero);
             }
         }
-        let share = self.share_before();
+        let share = self.step.share_before();
         let passed = Vector { x: new.x - old.x, y: new.y - old.y, z: new.z - old.z };
         let kinetic = L::splat(0.5) * mass * old.dot(&passed.mul_add(L::splat(2.0 * share), &old));
         tally.kinetic = tally.kinetic + L::select(booked, rounded(kinetic, energy), zero);
-        let momentum = L::splat(self.quanta.momentum.magic());
+        let momentum = L::splat(self.step.quanta.momentum.magic());
         let carried = passed.mul_add(L::splat(share), &old).scaled(mass);
         tally.momentum.x = tally.momentum.x + L::select(booked, rounded(carried.x, momentum), zero);
         tally.momentum.y = tally.momentum.y + L::select(booked, rounded(carried.y, momentum), zero);
@@ -318,16 +288,11 @@ impl Advance<'_> {
             tally.high.y = tally.high.y.max(L::select(moved, x.y - from.y, tally.high.y));
             tally.high.z = tally.high.z.max(L::select(moved, x.z - from.z, tally.high.z));
             let squared = new.dot(&new);
-            let gain = L::splat(SPEED_LAG * self.dt) * force.dot(&force).sqrt() / mass;
+            let gain = L::splat(SPEED_LAG * self.step.dt) * force.dot(&force).sqrt() / mass;
             tally.speed_squared = tally.speed_squared.max(L::select(moved, squared, zero));
             tally.speed_ahead = tally.speed_ahead.max(L::select(moved, squared.sqrt() + gain, zero));
         }
     }
-}
-
-/// Share of the time from `t_{n-1/2}` to `t_{n+1/2}` that lies before `t_n`: `v_n = v_{n-1/2} + share (v_{n+1/2} - v_{n-1/2})`.
-pub(crate) fn share_before(dt_previous: f64, dt: f64) -> f64 {
-    if dt_previous == 0.0 { 0.0 } else { dt_previous / (dt_previous + dt) }
 }
 
 /// The bits of the first N lanes.

@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 use crate::{
     constraint::{Circle, Constraint},
     exact::{Quanta, Quantum},
-    load::{Drive, Loads},
-    nodes::share_before,
+    load::Drive,
+    time_step::TimeStep,
     vectors::{cross, dot, turn, turned},
     work::Work,
 };
@@ -182,22 +182,6 @@ impl Push {
     }
 }
 
-/// One step of time for bodies.
-pub struct Advance<'a> {
-    /// `dt_{n-1}` (time).
-    pub dt_previous: f64,
-    /// `dt_n` (time).
-    pub dt: f64,
-    /// `t_n` (time).
-    pub time: f64,
-    /// `n`.
-    pub cycle: u64,
-    /// Curves, nodal forces, gravity, relaxation.
-    pub loads: &'a Loads,
-    /// Quanta of the sums.
-    pub quanta: Quanta,
-}
-
 /// What a body says of a step, each number rounded to its quantum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Booked {
@@ -248,17 +232,10 @@ struct Prescribed {
     spin: [Option<f64>; 3],
 }
 
-impl Advance<'_> {
-    /// The mean of this step and the one before (time).
-    pub fn half_steps(&self) -> f64 {
-        0.5 * (self.dt_previous + self.dt)
-    }
-
+impl TimeStep<'_> {
     /// What a push, loads and the past make of a body.
     pub fn free(&self, body: &Body, push: &Push, state: &State) -> Free {
         let half_steps = self.half_steps();
-        let mean =
-            |drive: &Drive| drive.mean_around(&self.loads.curves, self.time, [self.dt_previous, self.dt]);
         let force_quantum = self.quanta.force.value();
         let torque_quantum = force_quantum * body.length.value();
         let pushed: [f64; 3] = std::array::from_fn(|a| {
@@ -276,19 +253,19 @@ impl Advance<'_> {
         };
         for &(node, load) in &body.forces {
             let load = &self.loads.forces[load as usize];
-            let scale = half_steps * mean(&load.drive);
+            let scale = half_steps * self.mean(&load.drive);
             give(load.force.map(|f| f * scale), body.places[node as usize]);
         }
         for pull in &body.pulls {
             let load = &self.loads.forces[pull.load as usize];
-            let scale = half_steps * mean(&load.drive) * pull.mass;
+            let scale = half_steps * self.mean(&load.drive) * pull.mass;
             give(load.force.map(|f| f * scale), pull.place);
         }
         if let Some(gravity) = self.loads.gravity {
-            let scale = half_steps * mean(&gravity.drive);
+            let scale = half_steps * self.mean(&gravity.drive);
             (0..3).for_each(|a| velocity[a] += gravity.acceleration[a] * scale);
         }
-        let loss = self.loads.loss(self.time, half_steps);
+        let loss = self.loss();
         if loss != 0.0 {
             for a in 0..3 {
                 velocity[a] -= loss * state.velocity[a];
@@ -346,7 +323,7 @@ impl Advance<'_> {
     pub fn booked(&self, body: &Body, free: &Free, impulse: &Impulse, old: &State, new: &State) -> Booked {
         let Quanta { energy, momentum: of_momentum, .. } = self.quanta;
         let (velocity, momentum) = (new.velocity, new.momentum);
-        let share = share_before(self.dt_previous, self.dt);
+        let share = self.share_before();
         // As of nodes, see `crate::work`.
         let at_share = |old: f64, between: f64| (2.0 * share).mul_add(between - old, old);
         let translation = at_share(dot(old.velocity, old.velocity), dot(old.velocity, velocity));
@@ -365,7 +342,7 @@ impl Advance<'_> {
         let products = [work(old.velocity, old.spin), work(velocity, new.spin)];
         Booked {
             kinetic: energy.round(kinetic),
-            external: Work::of(products, share, energy.dithered(self.cycle)),
+            external: Work::of(products, share, self.dithered()),
             momentum: [0, 1, 2].map(|a| of_momentum.round(carried(a))),
         }
     }

@@ -7,6 +7,7 @@ use crate::{
     exact::rounded,
     lanes::{Lane, SET, Width, dispatch::Task},
     nodes::{Advance, NodeSet},
+    time_step::TimeStep,
     work::{self, Work},
 };
 
@@ -90,7 +91,7 @@ impl Task for Turn<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lane>(mut self) -> (f64, Work) {
-        let loss = self.advance.loss();
+        let loss = self.advance.step.loss();
         let zero = L::splat(0.0);
         let mut sums = Sums { kinetic: zero, work: [zero; 2] };
         for index in 0..self.sets.len() {
@@ -112,7 +113,7 @@ impl Task for Turn<'_, '_> {
 impl Turn<'_, '_> {
     /// What is prescribed to nodes of a set with constraints, if anything is.
     fn held(&self, index: usize, constrained: u8) -> Option<Held> {
-        let Advance { time, dt, loads, .. } = *self.advance;
+        let TimeStep { time, dt, loads, .. } = self.advance.step;
         let mut held = Held { nodes: [0; 3], rates: [[0.0; SET]; 3] };
         for lane in (0..SET).filter(|lane| constrained >> lane & 1 == 1) {
             let constraint = &self.advance.constraints[usize::from(self.constraint[index * SET + lane])];
@@ -140,9 +141,9 @@ impl Turn<'_, '_> {
     ) {
         let at = first + lane;
         let (zero, half, energy) =
-            (L::splat(0.0), L::splat(0.5), L::splat(self.advance.quanta.energy.magic()));
-        let half_steps = L::splat(0.5 * (self.advance.dt_previous + self.advance.dt));
-        let share = self.advance.share_before();
+            (L::splat(0.0), L::splat(0.5), L::splat(self.advance.step.quanta.energy.magic()));
+        let half_steps = L::splat(self.advance.step.half_steps());
+        let share = self.advance.step.share_before();
         // SAFETY: the caller's promise.
         let inertia = unsafe { L::load(&self.turning.inertia, at) };
         let scale = half_steps / inertia;
@@ -181,7 +182,7 @@ impl Turn<'_, '_> {
         let kinetic = rounded(half * inertia * product, energy);
         sums.kinetic = sums.kinetic + L::select(booked, kinetic, zero);
         if loss > 0.0 || held.is_some() {
-            let quantum = self.advance.quanta.energy.dithered(self.advance.cycle);
+            let quantum = self.advance.step.dithered();
             for (sum, half) in
                 sums.work.iter_mut().zip(work::halves([inertia * before, inertia * after], share))
             {
@@ -221,15 +222,17 @@ mod tests {
         for factor in [None, Some(0.9)] {
             let relaxation = factor.map(|factor| Relaxation { factor, rate: 0.0, until: 1.0 });
             let advance = Advance {
-                dt_previous: 1e-4,
-                dt: 3e-4,
-                time: 0.0,
-                cycle: 7,
+                step: TimeStep {
+                    dt_previous: 1e-4,
+                    dt: 3e-4,
+                    time: 0.0,
+                    cycle: 7,
+                    loads: &Loads { relaxation, ..Loads::default() },
+                    quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
+                },
                 constraints: &constraints,
                 walls: &[],
                 poses: &[],
-                loads: &Loads { relaxation, ..Loads::default() },
-                quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
             };
             let run = |width: Width| {
                 let mut turning = Turning::new(&spin, inertia.clone());

@@ -23,6 +23,7 @@ use crate::{
     rigid::{self, Body, Booked, ENTRIES, Free, PUSH, Push, State},
     setup::Setup,
     spin::Turning,
+    time_step::TimeStep,
     vote::Vote,
 };
 
@@ -177,7 +178,7 @@ impl Domain {
     pub(super) fn move_bodies(&mut self, totals: &[f64], dt_previous: f64, dt: f64) {
         let stride = self.stride();
         let (time, loads, quanta) = (self.time, &self.setup.loads, self.quanta);
-        let advance = rigid::Advance { dt_previous, dt, time, cycle: self.cycle, loads, quanta };
+        let step = TimeStep { dt_previous, dt, time, cycle: self.cycle, loads, quanta };
         let bodies = &self.setup.bodies;
         if self.sends_pushes {
             for (b, held) in self.bodies.iter_mut().enumerate() {
@@ -188,14 +189,14 @@ impl Domain {
             }
         }
         let states: Vec<State> = self.bodies.iter().map(|held| held.state).collect();
-        let free = |(held, body): (&Held, &Body)| advance.free(body, &held.push, &held.state);
+        let free = |(held, body): (&Held, &Body)| step.free(body, &held.push, &held.state);
         let free: Vec<Free> = self.bodies.iter().zip(bodies).map(free).collect();
-        let moving = Moving { advance: &advance, bodies, states: &states, free: &free };
+        let moving = Moving { step: &step, bodies, states: &states, free: &free };
         let (impulses, votes) = self.mechanism.hold(&self.setup.joints, &moving);
         self.joint_votes = votes;
         for (b, held) in self.bodies.iter_mut().enumerate() {
-            held.state = advance.moved(&bodies[b], &free[b], &impulses[b], &states[b]);
-            held.booked = advance.booked(&bodies[b], &free[b], &impulses[b], &states[b], &held.state);
+            held.state = step.moved(&bodies[b], &free[b], &impulses[b], &states[b]);
+            held.booked = step.booked(&bodies[b], &free[b], &impulses[b], &states[b], &held.state);
         }
     }
 

@@ -147,7 +147,7 @@ impl HeldBlock {
             self.booked.external.merge(external);
         }
         if !self.faces.is_empty() {
-            self.booked.external.merge(face::work(&self.faces, block, advance));
+            self.booked.external.merge(face::work(&self.faces, block, &advance.step));
         }
         if self.eroding.as_mut().is_some_and(Eroding::take_change) {
             // Loads leave with the faces of eroded elements.

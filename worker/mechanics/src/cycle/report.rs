@@ -74,7 +74,7 @@ impl Domain {
         self.gauges.iter().map(read).collect()
     }
 
-    /// The vote of the cycle, which leaves an empty one for the next. `share_before` is that of [`crate::nodes::share_before`].
+    /// The vote of the cycle, which leaves an empty one for the next. `share_before` is that of [`crate::time_step::TimeStep::share_before`].
     pub(super) fn finish_vote(&mut self, share_before: f64) -> Vote {
         let mut vote = std::mem::replace(&mut self.vote, Vote::empty(self.n_parts));
         for held_block in &mut self.held_blocks {

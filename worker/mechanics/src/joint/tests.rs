@@ -71,18 +71,17 @@ impl World {
         for _ in 0..steps {
             let dt_previous = if self.time == 0.0 { 0.0 } else { DT };
             let quanta = Quanta { force: fine, energy: fine, momentum: fine, arm: 1.0 };
-            let advance =
-                Advance { dt_previous, dt: DT, time: self.time, cycle: 0, loads: &self.loads, quanta };
-            let free = |(body, state)| advance.free(body, &Push::default(), state);
+            let step =
+                TimeStep { dt_previous, dt: DT, time: self.time, cycle: 0, loads: &self.loads, quanta };
+            let free = |(body, state)| step.free(body, &Push::default(), state);
             let free: Vec<Free> = self.bodies.iter().zip(&self.states).map(free).collect();
-            let moving =
-                Moving { advance: &advance, bodies: &self.bodies, states: &self.states, free: &free };
+            let moving = Moving { step: &step, bodies: &self.bodies, states: &self.states, free: &free };
             let (impulses, votes) = mechanism.hold(&self.joints, &moving);
             self.kinetic = 0.0;
             let old = self.states.clone();
             for (b, body) in self.bodies.iter().enumerate() {
-                self.states[b] = advance.moved(body, &free[b], &impulses[b], &old[b]);
-                let booked = advance.booked(body, &free[b], &impulses[b], &old[b], &self.states[b]);
+                self.states[b] = step.moved(body, &free[b], &impulses[b], &old[b]);
+                let booked = step.booked(body, &free[b], &impulses[b], &old[b], &self.states[b]);
                 self.kinetic += booked.kinetic;
                 self.external += booked.external.before + booked.external.after;
             }

@@ -10,9 +10,9 @@ use crate::{
     exact::Quantum,
     material::Material,
     mesh::FACES,
-    nodes::Advance,
     setup::Control,
-    vectors::{cross, dot},
+    time_step::TimeStep,
+    vectors::{cross, dot, minus},
     work::Work,
 };
 
@@ -85,12 +85,30 @@ pub(super) fn corner_areas(x: [[f64; 3]; 4]) -> [[f64; 3]; 4] {
     })
 }
 
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|axis| a[axis] - b[axis])
-}
-
 fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
+}
+
+/// `a` in the direction of length 1, and its length; nothing has no direction.
+fn unit(a: [f64; 3]) -> ([f64; 3], f64) {
+    let size = norm(a);
+    (if size > 0.0 { a.map(|c| c / size) } else { a }, size)
+}
+
+/// The centre of a face and its outward normal of unit length.
+fn middle(x: [[f64; 3]; 4]) -> ([f64; 3], [f64; 3]) {
+    let centre = std::array::from_fn(|a| 0.25 * ((x[0][a] + x[1][a]) + (x[2][a] + x[3][a])));
+    (centre, unit(cross(minus(x[2], x[0]), minus(x[3], x[1]))).0)
+}
+
+/// The force of the dampers on a corner of this area vector and velocity.
+fn damped(area: [f64; 3], v: [f64; 3], [longitudinal, shear, _]: [f64; 3]) -> [f64; 3] {
+    let (normal, size) = unit(area);
+    let speed = dot(normal, v);
+    std::array::from_fn(|a| {
+        let across = normal[a] * speed;
+        (across * longitudinal + (v[a] - across) * shear) * -size
+    })
 }
 
 /// Adds the loads at `time` to the forces of the block, and keeps them for [`work`]. A pressure is its mean over a step `dt` around that time: the
@@ -111,48 +129,23 @@ pub(crate) fn apply(
     for face in faces {
         let nodes = face.nodes;
         let at = |values: &[Vec<f64>; 3], n: usize| [values[0][n], values[1][n], values[2][n]];
-        let areas = corner_areas(nodes.map(|n| at(&block.x, n)));
+        let places = nodes.map(|n| at(&block.x, n));
         let velocities = nodes.map(|n| at(&block.v, n));
+        let areas = corner_areas(places);
+        let pressed = |pressure: f64| areas.map(|area| area.map(|c| c * -pressure));
         let kind = loads.surfaces[face.load as usize].kind;
-        face.power = 0.0;
-        let blast = match kind {
+        let forces = match kind {
+            SurfaceKind::Pressure(drive) => pressed(mean(drive)),
             SurfaceKind::Blast(charge) => {
-                let places = nodes.map(|n| at(&block.x, n));
-                let centre: [f64; 3] = std::array::from_fn(|a| {
-                    0.25 * ((places[0][a] + places[1][a]) + (places[2][a] + places[3][a]))
-                });
-                let across = cross(minus(places[2], places[0]), minus(places[3], places[1]));
-                let size = norm(across);
-                let normal = if size > 0.0 { across.map(|c| c / size) } else { across };
-                loads.charges[charge as usize].pressure(centre, normal, time)
+                let (centre, normal) = middle(places);
+                pressed(loads.charges[charge as usize].pressure(centre, normal, time))
             }
-            SurfaceKind::Pressure(_) | SurfaceKind::Moving(_) | SurfaceKind::Transmit => 0.0,
+            SurfaceKind::Moving(load) => moments[load as usize].forces(&places),
+            SurfaceKind::Transmit => std::array::from_fn(|c| damped(areas[c], velocities[c], face.impedance)),
         };
-        let moving = match kind {
-            SurfaceKind::Moving(load) => moments[load as usize].forces(&nodes.map(|n| at(&block.x, n))),
-            _ => [[0.0; 3]; 4],
-        };
+        face.power = 0.0;
         for (corner, &n) in nodes.iter().enumerate() {
-            let (area, v) = (areas[corner], velocities[corner]);
-            let force = match kind {
-                SurfaceKind::Pressure(drive) => {
-                    let tension = -mean(drive);
-                    area.map(|c| c * tension)
-                }
-                SurfaceKind::Blast(_) => area.map(|c| c * -blast),
-                SurfaceKind::Moving(_) => moving[corner],
-                SurfaceKind::Transmit => {
-                    let size = norm(area);
-                    let normal = if size > 0.0 { area.map(|c| c / size) } else { area };
-                    let speed = dot(normal, v);
-                    let [longitudinal, shear, _] = face.impedance;
-                    std::array::from_fn(|a| {
-                        let across = normal[a] * speed;
-                        (across * longitudinal + (v[a] - across) * shear) * -size
-                    })
-                }
-            };
-            let force = force.map(|c| quantum.round(c));
+            let (force, v) = (forces[corner].map(|c| quantum.round(c)), velocities[corner]);
             for a in 0..3 {
                 block.f[a][n] += force[a];
                 vote.force_bound = vote.force_bound.max(force[a].abs());
@@ -185,9 +178,9 @@ fn damper_limit(x: &[[f64; 3]; 8], together: f64, speed: f64, damping: f64) -> f
 }
 
 /// Work of the loads in the step around the time at which they acted.
-pub(crate) fn work(faces: &[LoadedFace], block: &Block, advance: &Advance<'_>) -> Work {
-    let (half_steps, share) = (advance.half_steps(), advance.share_before());
-    let quantum = advance.quanta.energy.dithered(advance.cycle);
+pub(crate) fn work(faces: &[LoadedFace], block: &Block, step: &TimeStep<'_>) -> Work {
+    let (half_steps, share) = (step.half_steps(), step.share_before());
+    let quantum = step.dithered();
     let mut sum = Work::default();
     for face in faces {
         let after: f64 = face

@@ -34,7 +34,7 @@ impl Advance<'_> {
         if walls == 0 || (kept == held && set.strikes == 0) {
             return [held, 0];
         }
-        let times = [self.dt, wall::FORESEEN * self.dt];
+        let times = [self.step.dt, wall::FORESEEN * self.step.dt];
         let (mut clear, mut near) = (L::mask(u32::MAX), 0);
         while walls != 0 {
             let w = walls.trailing_zeros() as usize;
@@ -79,8 +79,14 @@ impl Advance<'_> {
             let of = |along: &[Vec<f64>; 3]| std::array::from_fn(|a| along[a][i]);
             let felt = self.constraints[usize::from(nodes.constraint[i])].walls;
             let (x, v) = (of(nodes.x), of(nodes.v));
-            greatest =
-                greatest.max(wall::closing(self.walls, self.poses, felt, x, v, wall::FORESEEN * self.dt));
+            greatest = greatest.max(wall::closing(
+                self.walls,
+                self.poses,
+                felt,
+                x,
+                v,
+                wall::FORESEEN * self.step.dt,
+            ));
         }
         greatest
     }
@@ -94,8 +100,8 @@ impl Advance<'_> {
         velocity: &mut [[f64; SET]; 3],
     ) -> Work {
         let mut external = Work::default();
-        let half_steps = 0.5 * (self.dt_previous + self.dt);
-        let curves = &self.loads.curves;
+        let half_steps = self.step.half_steps();
+        let curves = &self.step.loads.curves;
         let mut same: Option<(u16, [Option<f64>; 3])> = None;
         for lane in (0..SET).filter(|lane| set.held >> lane & 1 == 1) {
             let i = at + lane;
@@ -109,9 +115,9 @@ impl Advance<'_> {
             let mut is_held = held.forces != 0;
             let mut forces = held.forces;
             while forces != 0 {
-                let load = &self.loads.forces[forces.trailing_zeros() as usize];
+                let load = &self.step.loads.forces[forces.trailing_zeros() as usize];
                 let inertia = if load.by_mass { 1.0 } else { mass };
-                let scale = half_steps * self.mean(&load.drive) / inertia;
+                let scale = half_steps * self.step.mean(&load.drive) / inertia;
                 for a in 0..3 {
                     new[a] += load.force[a] * scale;
                 }
@@ -121,7 +127,7 @@ impl Advance<'_> {
             // Neighbours have the same velocities, as long as no circle has them depend on the place.
             let prescribed = match same {
                 Some((of, velocities)) if of == constraint => velocities,
-                _ => held.prescribed(curves, x, self.time, self.dt),
+                _ => held.prescribed(curves, x, self.step.time, self.step.dt),
             };
             same = held.circle.is_none().then_some((constraint, prescribed));
             for axis in 0..3 {
@@ -132,7 +138,7 @@ impl Advance<'_> {
                 if let Some(support) = held.supports[axis].checked_sub(1).filter(|_| booked) {
                     let vote = &mut nodes.walls[self.walls.len() + usize::from(support)];
                     let impulse = mass * (new[axis] - before);
-                    vote.impulse[axis] -= self.quanta.momentum.round(impulse);
+                    vote.impulse[axis] -= self.step.quanta.momentum.round(impulse);
                     vote.work.merge(self.work(impulse * old[axis], impulse * new[axis]));
                 }
             }
@@ -141,7 +147,7 @@ impl Advance<'_> {
                 let w = walls.trailing_zeros() as usize;
                 let before = new;
                 walls &= walls - 1;
-                if !self.walls[w].stop(&self.poses[w], x, &mut new, self.dt) {
+                if !self.walls[w].stop(&self.poses[w], x, &mut new, self.step.dt) {
                     continue;
                 }
                 is_held = true;
@@ -172,7 +178,7 @@ impl Advance<'_> {
     fn struck(&self, vote: &mut WallVote, [_, speed]: &Pose, mass: f64, [old, free, new]: [[f64; 3]; 3]) {
         let impulse: [f64; 3] = std::array::from_fn(|a| mass * (new[a] - free[a]));
         for a in 0..3 {
-            vote.impulse[a] -= self.quanta.momentum.round(impulse[a]);
+            vote.impulse[a] -= self.step.quanta.momentum.round(impulse[a]);
         }
         let with = |v: [f64; 3]| (0..3).map(|a| impulse[a] * v[a]).sum::<f64>();
         let done = with(*speed);
@@ -182,6 +188,6 @@ impl Advance<'_> {
 
     /// Work of an impulse in this step, from its products with the velocities before and after it.
     fn work(&self, with_old: f64, with_new: f64) -> Work {
-        Work::of([with_old, with_new], self.share_before(), self.quanta.energy.dithered(self.cycle))
+        Work::of([with_old, with_new], self.step.share_before(), self.step.dithered())
     }
 }

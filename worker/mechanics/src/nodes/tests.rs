@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
-    exact::Quantum,
-    load::{Curve, Drive, Gravity, NodalForce, Relaxation},
+    exact::{Quanta, Quantum},
+    load::{Curve, Drive, Gravity, Loads, NodalForce, Relaxation},
     wall::{Motion, Shape},
 };
 
@@ -32,15 +32,17 @@ fn loaded_one(
     let q = Quantum::for_reference(1e3, 46);
     let constraints = [Constraint::default(), constraint];
     let advance = Advance {
-        dt_previous: 1e-3,
-        dt: 1e-3,
-        time: 0.5,
-        cycle: 0,
+        step: TimeStep {
+            dt_previous: 1e-3,
+            dt: 1e-3,
+            time: 0.5,
+            cycle: 0,
+            loads,
+            quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
+        },
         constraints: &constraints,
         walls,
         poses: &vec![Pose::default(); walls.len()],
-        loads,
-        quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
     };
     let mut nodes = Nodes {
         x: &mut x,
@@ -198,15 +200,17 @@ fn every_width_gives_the_same_bits_whatever_holds_the_nodes() {
         ..Loads::default()
     };
     let advance = Advance {
-        dt_previous: 1e-4,
-        dt: 1.1e-4,
-        time: 0.0,
-        cycle: 3,
+        step: TimeStep {
+            dt_previous: 1e-4,
+            dt: 1.1e-4,
+            time: 0.0,
+            cycle: 3,
+            loads: &loads,
+            quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
+        },
         constraints: &constraints,
         walls: &[wall, beside],
         poses: &[Pose::default(); 2],
-        loads: &loads,
-        quanta: Quanta { force: quantum, energy: quantum, momentum: quantum, arm: 1.0 },
     };
     let run = |width: Width| {
         let (mut x, mut v, mut f) = (x.clone(), v.clone(), f.clone());
@@ -256,15 +260,17 @@ fn energy_is_kept_where_the_time_step_changes() {
         let mut f = [0, 1, 2].map(|_| vec![0.0; SET]);
         f[2][0] = -stiffness * at;
         let advance = Advance {
-            dt_previous,
-            dt,
-            time,
-            cycle,
+            step: TimeStep {
+                dt_previous,
+                dt,
+                time,
+                cycle,
+                loads: &loads,
+                quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
+            },
             constraints: &[Constraint::default()],
             walls: &[],
             poses: &[],
-            loads: &loads,
-            quanta: Quanta { force: q, energy: q, momentum: q, arm: 1.0 },
         };
         let sets = [NodeSet { booked: 1, ..NodeSet::default() }];
         let booked = advance.run(

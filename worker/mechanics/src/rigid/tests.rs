@@ -2,7 +2,7 @@ use super::*;
 use crate::{
     constraint::Constraint,
     element::shell4::Rule,
-    load::{Curve, Gravity},
+    load::{Curve, Gravity, Loads},
     material::{Eos, Failure, Material, Strength},
     mesh::{Mesh, Part, Section, Topology},
 };
@@ -54,9 +54,9 @@ fn spinning(size: [f64; 3], spin: [f64; 3]) -> Body {
     made(&mesh, given, &[[0.0; 3]; 8]).expect("a body")
 }
 
-fn advance(loads: &Loads, time: f64, dt: f64) -> Advance<'_> {
+fn step_of(loads: &Loads, time: f64, dt: f64) -> TimeStep<'_> {
     let q = Quantum::for_reference(1e6, 46);
-    Advance {
+    TimeStep {
         dt_previous: dt,
         dt,
         time,
@@ -67,11 +67,11 @@ fn advance(loads: &Loads, time: f64, dt: f64) -> Advance<'_> {
 }
 
 /// Moves a body that nothing pushes.
-fn step(advance: &Advance<'_>, body: &Body, state: &mut State) -> Booked {
-    let free = advance.free(body, &Push::default(), state);
+fn go(step: &TimeStep<'_>, body: &Body, state: &mut State) -> Booked {
+    let free = step.free(body, &Push::default(), state);
     let old = *state;
-    *state = advance.moved(body, &free, &Impulse::default(), &old);
-    advance.booked(body, &free, &Impulse::default(), &old, state)
+    *state = step.moved(body, &free, &Impulse::default(), &old);
+    step.booked(body, &free, &Impulse::default(), &old, state)
 }
 
 #[test]
@@ -258,7 +258,7 @@ fn a_round_top_precesses_as_eulers_equations_say_and_keeps_energy_and_momentum()
     let mut error = 0.0_f64;
     let mut energies = [f64::INFINITY, 0.0];
     for n in 0..steps {
-        let booked = step(&advance(&loads, 0.0, dt), &body, &mut state);
+        let booked = go(&step_of(&loads, 0.0, dt), &body, &mut state);
         energies = [energies[0].min(booked.kinetic), energies[1].max(booked.kinetic)];
         assert_eq!(state.momentum, body.start.momentum, "angular momentum, to the bit");
         // The axis of the body turns about the momentum at the rate |L| / I.
@@ -291,7 +291,7 @@ fn a_book_that_turns_over_does_not_gain_energy() {
     let mut flips = 0;
     let mut up = true;
     for _ in 0..100_000 {
-        let booked = step(&advance(&loads, 0.0, dt), &body, &mut state);
+        let booked = go(&step_of(&loads, 0.0, dt), &body, &mut state);
         energies = [energies[0].min(booked.kinetic), energies[1].max(booked.kinetic)];
         let now = turned(&state.attitude, [0.0, 0.0, 1.0])[2] > 0.0;
         flips += u32::from(now != up);
@@ -316,11 +316,11 @@ fn a_prescribed_turn_has_its_angle_and_its_support_does_the_work() {
     body.start.velocity[0] = 5.0;
     let mut state = body.start;
     let (dt, mut work) = (1e-3, 0.0);
-    let first = step(&Advance { dt_previous: 0.0, ..advance(&loads, 0.0, dt) }, &body, &mut state);
+    let first = go(&TimeStep { dt_previous: 0.0, ..step_of(&loads, 0.0, dt) }, &body, &mut state);
     let mut last = first;
     for n in 1..1000 {
         work += last.external.after;
-        last = step(&advance(&loads, f64::from(n) * dt, dt), &body, &mut state);
+        last = go(&step_of(&loads, f64::from(n) * dt, dt), &body, &mut state);
         work += last.external.before;
     }
     // Angle 1 about z after one second; five metres along x, and half g t^2 down.
