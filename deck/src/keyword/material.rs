@@ -3,6 +3,7 @@
 mod brittle;
 mod composite;
 mod foam;
+mod johnson_cook;
 mod metal;
 mod rubber;
 
@@ -18,7 +19,6 @@ use super::{
     fields::{Context, Fields, TENS},
 };
 use crate::{
-    fault::short,
     log::Log,
     place::{Origin, Place, Placed},
     table::Range,
@@ -29,7 +29,7 @@ pub(super) struct MaterialCard {
     pub(super) at: Place,
     pub(super) density: f64,
     /// Young's modulus and Poisson's ratio; none where an equation of state stands for them.
-    pub(super) elastic: Option<(f64, f64)>,
+    pub(super) elastic: Option<Moduli>,
     pub(super) law: Law,
     /// When elements leave by its own card.
     pub(super) erosion: Limits,
@@ -156,6 +156,22 @@ const NUMBERS: [(&str, &str); 27] = [
 const COLD: [f64; 2] = [300.0, 1e6];
 const COLD_HEAT: f64 = 1e40;
 
+/// Young's modulus and Poisson's ratio.
+type Moduli = (f64, f64);
+
+/// What a keyword says beside the density: moduli, where no equation of state stands for them, and the law.
+type Said = Option<(Option<Moduli>, Law)>;
+
+/// A law that has its moduli in itself or in its equation of state.
+fn alone(law: Option<Law>) -> Said {
+    law.map(|law| (None, law))
+}
+
+/// A law that needs the moduli of its card.
+fn elastic(moduli: Option<Moduli>, law: Option<Law>) -> Said {
+    moduli.zip(law).map(|(moduli, law)| (Some(moduli), law))
+}
+
 /// Reads a `*MAT_` keyword; none after a fault without which nothing is known of it.
 pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialCard> {
     let log = context.log;
@@ -165,218 +181,50 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
     let f: [_; 8] = std::array::from_fn(|i| context.fields(cards[i], block.width, &TENS));
     let density = f[0].positive(1, "a density");
     let mut limits = Limits::default();
-    let moduli = |i: usize| {
-        let (young, poisson) = (f[0].positive(i, "Young's modulus"), f[0].real(i + 1, 0.0));
-        if !(-1.0 < poisson && poisson < 0.5) {
-            f[0].fault(i + 1, "Poisson's ratio above -1 and below 0.5", "correct it");
-            return None;
-        }
-        young.map(|young| (young, poisson))
-    };
-    // Cowper and Symonds: both constants or none.
-    let rate = |card: usize| {
-        let [c, p] = [0, 1].map(|i| f[card].real(i, 0.0));
-        (c > 0.0 && p > 0.0).then_some([c, p])
-    };
-    let mut needs_moduli = true;
     let mut fibres = None;
-    let (elastic, law) = match word {
-        "MAT_ELASTIC" => {
-            for i in [4, 5].into_iter().filter(|i| f[0].real(*i, 0.0) != 0.0) {
-                f[0].fault(i, "no damping of bending and axial forces", "leave DA and DB blank");
-            }
-            (moduli(2), Some(Law::Elastic))
-        }
-        "MAT_PLASTIC_KINEMATIC" => {
-            if f[0].real(5, 0.0) != 0.0 && f[0].real(6, 0.0) != 1.0 {
-                log.warn(
-                    cards[0].at,
-                    format!("BETA {}: hardening is isotropic, as with BETA 1", f[0].real(6, 0.0)),
-                );
-            }
-            if f[1].real(3, 0.0) != 0.0 {
-                log.warn(cards[1].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
-            }
-            limits.read_failure_strain(&f[1], 2, "FS");
-            let yield_stress = f[0].positive(4, "a yield stress");
-            let tangent = f[0].placed(5, "ETAN", f[0].real(5, 0.0));
-            (
-                moduli(2),
-                yield_stress.map(|yield_stress| Law::Bilinear { yield_stress, tangent, rate: rate(1) }),
-            )
-        }
+    let mut along = |(law, axes): (Option<Law>, Fibres)| {
+        fibres = Some(axes);
+        alone(law)
+    };
+    let said = match word {
+        "MAT_ELASTIC" => elastic(moduli(&f[0]), metal::elastic(&f[0])),
+        "MAT_PLASTIC_KINEMATIC" => elastic(moduli(&f[0]), metal::plastic_kinematic(&f, &mut limits, log)),
         "MAT_PIECEWISE_LINEAR_PLASTICITY" => {
-            limits.read_time_step(&f[0], 7, "TDEL");
-            if f[1].integer(3) != 0 {
-                f[1].fault(3, "no curve for the rate", "use C and P, Cowper and Symonds");
-            }
-            if f[1].real(4, 0.0) != 0.0 {
-                log.warn(cards[1].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
-            }
-            limits.read_failure_strain(&f[0], 6, "FAIL");
-            let curve = f[1].integer(2);
-            let points: Vec<[f64; 2]> =
-                (0..8).map(|i| [f[2].real(i, 0.0), f[3].real(i, 0.0)]).take_while(|p| p[1] > 0.0).collect();
-            let law = match u32::try_from(curve) {
-                Ok(0) if points.is_empty() => {
-                    f[0].positive(4, "a yield stress").map(|yield_stress| Law::Bilinear {
-                        yield_stress,
-                        tangent: f[0].placed(5, "ETAN", f[0].real(5, 0.0)),
-                        rate: rate(1),
-                    })
-                }
-                Ok(curve) => {
-                    Some(Law::Tabulated { points, curve: f[1].placed(2, "LCSS", curve), rate: rate(1) })
-                }
-                Err(_) => {
-                    f[1].fault(2, "a curve of yield stress by plastic strain", "give its number");
-                    None
-                }
-            };
-            (moduli(2), law)
+            elastic(moduli(&f[0]), metal::piecewise_linear(&f, &mut limits, log))
         }
         "MAT_SIMPLIFIED_JOHNSON_COOK" => {
-            if f[0].real(4, 0.0) != 0.0 {
-                log.warn(cards[0].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
-            }
-            for i in [5, 6].into_iter().filter(|i| (f64::MIN_POSITIVE..1e15).contains(&f[1].real(*i, 0.0))) {
-                f[1].fault(i, "no bound of the stress", "leave SIGMAX and SIGSAT blank");
-            }
-            limits.read_failure_strain(&f[1], 4, "PSFAIL");
-            let elastic = moduli(2);
-            let (a, n) = (f[1].positive(0, "A"), f[1].real(2, 0.0));
-            let law = elastic.zip(a).map(|((young, poisson), a)| Law::JohnsonCook {
-                shear: young / (2.0 * (1.0 + poisson)),
-                constants: [
-                    a,
-                    not_negative(&f[1], 1),
-                    if n > 0.0 { n } else { 1.0 },
-                    not_negative(&f[1], 3),
-                    1.0,
-                ],
-                // Without heat the temperature stays where the yield stress is whole.
-                t_melt: COLD[1],
-                t_room: COLD[0],
-                rate0: Some(f[1].real(7, 1.0)).filter(|r| *r > 0.0).unwrap_or(1.0),
-                specific_heat: COLD_HEAT,
-                damage: None,
-                of_shells: None,
-            });
-            (elastic, law)
+            let moduli = moduli(&f[0]);
+            elastic(moduli, johnson_cook::simplified(&f, moduli, &mut limits, log))
         }
-        "MAT_JOHNSON_COOK" => {
-            let law = johnson_cook(&f, &mut needs_moduli, log);
-            // EROD other than 0 keeps broken elements in the mesh, without shear stress.
-            if matches!(&law, Some(Law::JohnsonCook { damage: Some(_), .. })) && f[3].integer(2) == 0 {
-                limits.by_failure(f[2].origin(4, "D1"));
-            }
-            (None, law)
-        }
+        "MAT_JOHNSON_COOK" => alone(johnson_cook::whole(&f, &mut limits, log)),
+        "MAT_MODIFIED_JOHNSON_COOK" => alone(johnson_cook::modified(&f, moduli(&f[0]), &mut limits)),
         "MAT_CABLE_DISCRETE_BEAM" => metal::cable(&f[0]),
         "MAT_SPOTWELD" => {
-            let elastic = moduli(2);
-            (elastic, metal::spot_weld(&f, elastic, &mut limits))
+            let moduli = moduli(&f[0]);
+            elastic(moduli, metal::spot_weld(&f, moduli, &mut limits))
         }
         "MAT_POWER_LAW_PLASTICITY" => {
-            if f[1].real(1, 0.0) != 0.0 {
-                log.warn(cards[1].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
-            }
-            limits.read_failure_strain(&f[1], 2, "EPSF");
-            let elastic = moduli(2);
-            (elastic, metal::power_law(&f, elastic))
+            let moduli = moduli(&f[0]);
+            elastic(moduli, metal::power_law(&f, moduli, &mut limits, log))
         }
-        "MAT_MODIFIED_JOHNSON_COOK" => {
-            needs_moduli = false;
-            (None, metal::modified_johnson_cook(&f, moduli(2), &mut limits))
-        }
-        "MAT_MODIFIED_ZERILLI_ARMSTRONG" => {
-            needs_moduli = false;
-            (None, metal::zerilli_armstrong(&f, &mut limits, log))
-        }
-        "MAT_STEINBERG" => {
-            needs_moduli = false;
-            (None, metal::steinberg_guinan(&f, density))
-        }
-        "MAT_JOHNSON_HOLMQUIST_CERAMICS" => {
-            needs_moduli = false;
-            (None, brittle::johnson_holmquist(&f, &mut limits))
-        }
-        "MAT_JOHNSON_HOLMQUIST_CONCRETE" => {
-            needs_moduli = false;
-            (None, brittle::concrete(&f, &mut limits, log))
-        }
-        "MAT_RHT" => {
-            needs_moduli = false;
-            (None, brittle::rht(&f, &mut limits, log))
-        }
-        "MAT_ORTHOTROPIC_ELASTIC" | "MAT_COMPOSITE_DAMAGE" => {
-            needs_moduli = false;
-            let (law, axes) = composite::orthotropic(&f, word == "MAT_COMPOSITE_DAMAGE");
-            fibres = Some(axes);
-            (None, law)
-        }
-        "MAT_ENHANCED_COMPOSITE_DAMAGE" => {
-            needs_moduli = false;
-            let (law, axes) = composite::enhanced(&f, &mut limits);
-            fibres = Some(axes);
-            (None, law)
-        }
-        "MAT_HONEYCOMB" => {
-            needs_moduli = false;
-            let (law, axes) = composite::honeycomb(&f, log);
-            fibres = Some(axes);
-            (None, law)
-        }
-        "MAT_VISCOELASTIC" => {
-            needs_moduli = false;
-            (None, rubber::viscoelastic(&f))
-        }
-        "MAT_MOONEY-RIVLIN_RUBBER" => {
-            needs_moduli = false;
-            (None, rubber::mooney_rivlin(&f))
-        }
-        "MAT_OGDEN_RUBBER" => {
-            needs_moduli = false;
-            (None, rubber::ogden(&f))
-        }
+        "MAT_MODIFIED_ZERILLI_ARMSTRONG" => alone(metal::zerilli_armstrong(&f, &mut limits, log)),
+        "MAT_STEINBERG" => alone(metal::steinberg_guinan(&f, density)),
+        "MAT_JOHNSON_HOLMQUIST_CERAMICS" => alone(brittle::johnson_holmquist(&f, &mut limits)),
+        "MAT_JOHNSON_HOLMQUIST_CONCRETE" => alone(brittle::concrete(&f, &mut limits, log)),
+        "MAT_RHT" => alone(brittle::rht(&f, &mut limits, log)),
+        "MAT_ORTHOTROPIC_ELASTIC" => along(composite::orthotropic(&f, false)),
+        "MAT_COMPOSITE_DAMAGE" => along(composite::orthotropic(&f, true)),
+        "MAT_ENHANCED_COMPOSITE_DAMAGE" => along(composite::enhanced(&f, &mut limits)),
+        "MAT_HONEYCOMB" => along(composite::honeycomb(&f, log)),
+        "MAT_VISCOELASTIC" => alone(rubber::viscoelastic(&f)),
+        "MAT_MOONEY-RIVLIN_RUBBER" => alone(rubber::mooney_rivlin(&f)),
+        "MAT_OGDEN_RUBBER" => alone(rubber::ogden(&f)),
         "MAT_CRUSHABLE_FOAM" | "MAT_LOW_DENSITY_FOAM" | "MAT_SOIL_AND_FOAM" => {
-            needs_moduli = false;
-            (None, foam::read(word, &f, log))
+            alone(foam::read(word, &f, log))
         }
-        "MAT_NULL" => {
-            needs_moduli = false;
-            let cut_off = f[0].real(2, 0.0);
-            if cut_off > 0.0 {
-                f[0].fault(2, "a pressure cut-off of 0 or below", "give it as a negative pressure");
-            }
-            if f[0].real(3, 0.0) != 0.0 {
-                log.warn(cards[0].at, "MU: fluids have no shear viscosity here");
-            }
-            limits.read_volumes(&f[0], [4, 5], ["TEROD", "CEROD"]);
-            (None, Some(Law::Null { cut_off: f[0].placed(2, "PC", cut_off) }))
-        }
-        "MAT_HIGH_EXPLOSIVE_BURN" | "MAT_008" => {
-            needs_moduli = false;
-            (None, explosive::read_material(&f[0], context))
-        }
-        "MAT_RIGID" => {
-            if f[0].real(4, 0.0) != 0.0 {
-                f[0].fault(4, "no coupling with another program", "leave N blank");
-            }
-            let frame = f[1].real(0, 0.0);
-            if frame < 0.0 {
-                f[1].fault(0, "constraints along the axes of space", "give CMO 1 or 0");
-            }
-            let mut held = [[false; 3]; 2];
-            for (i, axes) in held.iter_mut().enumerate().filter(|_| frame > 0.0) {
-                let code = f[1].integer(1 + i);
-                match usize::try_from(code).ok().and_then(|code| AXES_OF_CODE.get(code)) {
-                    Some(known) => *axes = *known,
-                    None => f[1].fault(1 + i, "a number from 0 to 7", "correct it"),
-                }
-            }
-            (moduli(2), Some(Law::Rigid { held }))
-        }
+        "MAT_NULL" => alone(Some(null(&f[0], &mut limits, log))),
+        "MAT_HIGH_EXPLOSIVE_BURN" | "MAT_008" => alone(explosive::read_material(&f[0], context)),
+        "MAT_RIGID" => elastic(moduli(&f[0]), Some(rigid(&f))),
         _ => {
             log.fault(
                 block.at,
@@ -396,72 +244,58 @@ pub(super) fn read(block: &Block<'_>, context: &Context<'_>) -> Option<MaterialC
         "MAT_ENHANCED_COMPOSITE_DAMAGE" => 8,
         _ => 1,
     });
-    if elastic.is_none() && needs_moduli {
-        return None;
-    }
-    Some(MaterialCard { at: cards[0].at, density: density?, elastic, law: law?, erosion: limits, fibres })
+    let (elastic, law) = said?;
+    Some(MaterialCard { at: cards[0].at, density: density?, elastic, law, erosion: limits, fibres })
 }
 
-/// A least strain at fracture that bounds none: LS-DYNA's own is 1e-6.
-const LEAST_FRACTURE_STRAIN: f64 = 1e-5;
+/// Young's modulus and Poisson's ratio, where most cards have them.
+fn moduli(f: &Fields<'_>) -> Option<Moduli> {
+    let (young, poisson) = (f.positive(2, "Young's modulus"), f.real(3, 0.0));
+    if !(-1.0 < poisson && poisson < 0.5) {
+        f.fault(3, "Poisson's ratio above -1 and below 0.5", "correct it");
+        return None;
+    }
+    young.map(|young| (young, poisson))
+}
 
-/// Five cards of `*MAT_JOHNSON_COOK`.
-fn johnson_cook(f: &[Fields<'_>; 8], needs_moduli: &mut bool, log: &Log<'_>) -> Option<Law> {
-    *needs_moduli = false;
-    let g = f[0].real(2, 0.0);
-    let (young, poisson) = (f[0].real(3, 0.0), f[0].real(4, 0.0));
-    let shear = if g > 0.0 { g } else { young / (2.0 * (1.0 + poisson)) };
-    if shear <= 0.0 {
-        f[0].fault(2, "a shear modulus above 0", "give G, or E and PR");
-        return None;
-    }
-    if f[0].real(5, 0.0) != 0.0 {
-        f[0].fault(5, "no step at which elements fail", "leave DTF blank");
-    }
-    if f[0].real(6, 0.0) != 0.0 {
-        log.warn(f[0].at, "VP: the rate of the whole deviatoric strain is used, as with VP 0");
-    }
-    if f[0].real(7, 0.0) != 0.0 {
-        let expected = "RATEOP 0: the yield stress follows the logarithm of the rate";
-        f[0].fault(7, expected, "leave it blank, and fit C and EPS0");
-    }
-    let (a, n, m) = (f[1].positive(0, "A"), f[1].real(2, 0.0), f[1].real(4, 0.0));
-    let (t_melt, t_room) = (f[1].real(5, 0.0), f[1].real(6, 0.0));
-    let heat = f[2].real(0, 0.0);
-    let d: [f64; 5] =
-        [f[2].real(4, 0.0), f[2].real(5, 0.0), f[2].real(6, 0.0), f[2].real(7, 0.0), f[3].real(0, 0.0)];
-    if d.iter().any(|d| *d != 0.0) && f[3].real(3, 0.0) > LEAST_FRACTURE_STRAIN {
-        let expected = "no EFMIN: the strain at fracture has no lower bound but that of its formula";
-        f[3].fault(3, expected, "leave it blank, or fit D1");
-    }
-    let cut_off = f[2].real(1, 0.0);
+/// `*MAT_NULL`: a fluid, whose pressure is that of its equation of state.
+fn null(f: &Fields<'_>, limits: &mut Limits, log: &Log<'_>) -> Law {
+    let cut_off = f.real(2, 0.0);
     if cut_off > 0.0 {
-        log.warn(f[2].at, format!("PC {}: no cut-off, which is a pressure below 0", short(cut_off)));
+        f.fault(2, "a pressure cut-off of 0 or below", "give it as a negative pressure");
     }
-    if cut_off < 0.0 && cut_off > -1e15 {
-        f[2].fault(1, "no pressure cut-off", "leave PC blank");
+    if f.real(3, 0.0) != 0.0 {
+        log.warn(f.at, "MU: fluids have no shear viscosity here");
     }
-    let warm = heat > 0.0 && m > 0.0 && t_melt > t_room;
-    if warm && t_room <= 0.0 {
-        f[1].fault(6, "a room temperature above 0 K", "give TR and TM in K");
-        return None;
+    limits.read_volumes(f, [4, 5], ["TEROD", "CEROD"]);
+    Law::Null { cut_off: f.placed(2, "PC", cut_off) }
+}
+
+/// `*MAT_RIGID`: which axes hold the centre and the turning of the body.
+fn rigid(f: &[Fields<'_>; 8]) -> Law {
+    if f[0].real(4, 0.0) != 0.0 {
+        f[0].fault(4, "no coupling with another program", "leave N blank");
     }
-    Some(Law::JohnsonCook {
-        shear,
-        constants: [
-            a?,
-            not_negative(&f[1], 1),
-            if n > 0.0 { n } else { 1.0 },
-            not_negative(&f[1], 3),
-            if warm { m } else { 1.0 },
-        ],
-        t_melt: if warm { t_melt } else { COLD[1] },
-        t_room: if warm { t_room } else { COLD[0] },
-        rate0: Some(f[1].real(7, 1.0)).filter(|r| *r > 0.0).unwrap_or(1.0),
-        specific_heat: if warm { heat } else { COLD_HEAT },
-        damage: d.iter().any(|d| *d != 0.0).then_some(d),
-        of_shells: (young > 0.0 && -1.0 < poisson && poisson < 0.5).then_some((young, poisson)),
-    })
+    let frame = f[1].real(0, 0.0);
+    if frame < 0.0 {
+        f[1].fault(0, "constraints along the axes of space", "give CMO 1 or 0");
+    }
+    let mut held = [[false; 3]; 2];
+    for (i, axes) in held.iter_mut().enumerate().filter(|_| frame > 0.0) {
+        let code = f[1].integer(1 + i);
+        match usize::try_from(code).ok().and_then(|code| AXES_OF_CODE.get(code)) {
+            Some(known) => *axes = *known,
+            None => f[1].fault(1 + i, "a number from 0 to 7", "correct it"),
+        }
+    }
+    Law::Rigid { held }
+}
+
+/// Warns of a strain rate that is another than that of the law.
+fn warn_of_vp(f: &Fields<'_>, i: usize, log: &Log<'_>) {
+    if f.real(i, 0.0) != 0.0 {
+        log.warn(f.place(i), "VP: the rate of the whole deviatoric strain is used, as with VP 0");
+    }
 }
 
 /// Five fields of sixteen columns.

@@ -1,27 +1,77 @@
-//! `*MAT_` of metals whose yield stress depends on rate and temperature.
+//! `*MAT_` of metals, but for those after Johnson and Cook.
 
 use mechanics::{
-    material::{Eos, Failure, Strength},
-    strength::{ModifiedJohnsonCook, PowerLaw, SteinbergGuinan, ZerilliArmstrong},
+    material::Strength,
+    strength::{PowerLaw, SteinbergGuinan, ZerilliArmstrong},
 };
 
-use super::{COLD, COLD_HEAT, Law, not_negative};
+use super::{COLD_HEAT, Law, Moduli, Said, not_negative, warn_of_vp};
 use crate::{
     fault::short,
     keyword::{erosion::Limits, fields::Fields},
     log::Log,
-    table::Range,
 };
 
-/// A field that asks for more than the law has.
-fn refuse(f: &Fields<'_>, i: usize, expected: &str, advice: &str) {
+/// Refuses a field that asks for more than the law has.
+pub(super) fn refuse(f: &Fields<'_>, i: usize, expected: &str, advice: &str) {
     if f.real(i, 0.0) != 0.0 {
         f.fault(i, expected, advice);
     }
 }
 
+/// `*MAT_ELASTIC`: one card.
+pub(super) fn elastic(f: &Fields<'_>) -> Option<Law> {
+    for i in [4, 5] {
+        refuse(f, i, "no damping of bending and axial forces", "leave DA and DB blank");
+    }
+    Some(Law::Elastic)
+}
+
+/// Cowper and Symonds: both constants or none.
+fn rate(f: &Fields<'_>) -> Option<[f64; 2]> {
+    let [c, p] = [0, 1].map(|i| f.real(i, 0.0));
+    (c > 0.0 && p > 0.0).then_some([c, p])
+}
+
+/// Yield stress, tangent modulus and rate constants of two cards.
+fn bilinear(f: &[Fields<'_>; 8]) -> Option<Law> {
+    let tangent = f[0].placed(5, "ETAN", f[0].real(5, 0.0));
+    let yield_stress = f[0].positive(4, "a yield stress")?;
+    Some(Law::Bilinear { yield_stress, tangent, rate: rate(&f[1]) })
+}
+
+/// `*MAT_PLASTIC_KINEMATIC`: two cards.
+pub(super) fn plastic_kinematic(f: &[Fields<'_>; 8], limits: &mut Limits, log: &Log<'_>) -> Option<Law> {
+    if f[0].real(5, 0.0) != 0.0 && f[0].real(6, 0.0) != 1.0 {
+        log.warn(f[0].at, format!("BETA {}: hardening is isotropic, as with BETA 1", f[0].real(6, 0.0)));
+    }
+    warn_of_vp(&f[1], 3, log);
+    limits.read_failure_strain(&f[1], 2, "FS");
+    bilinear(f)
+}
+
+/// `*MAT_PIECEWISE_LINEAR_PLASTICITY`: four cards.
+pub(super) fn piecewise_linear(f: &[Fields<'_>; 8], limits: &mut Limits, log: &Log<'_>) -> Option<Law> {
+    limits.read_time_step(&f[0], 7, "TDEL");
+    if f[1].integer(3) != 0 {
+        f[1].fault(3, "no curve for the rate", "use C and P, Cowper and Symonds");
+    }
+    warn_of_vp(&f[1], 4, log);
+    limits.read_failure_strain(&f[0], 6, "FAIL");
+    let points: Vec<[f64; 2]> =
+        (0..8).map(|i| [f[2].real(i, 0.0), f[3].real(i, 0.0)]).take_while(|p| p[1] > 0.0).collect();
+    match u32::try_from(f[1].integer(2)) {
+        Ok(0) if points.is_empty() => bilinear(f),
+        Ok(curve) => Some(Law::Tabulated { points, curve: f[1].placed(2, "LCSS", curve), rate: rate(&f[1]) }),
+        Err(_) => {
+            f[1].fault(2, "a curve of yield stress by plastic strain", "give its number");
+            None
+        }
+    }
+}
+
 /// `*MAT_SPOTWELD` of beams and solids: yield stress, plastic hardening, and the plastic strain at which the weld is gone.
-pub(super) fn spot_weld(f: &[Fields<'_>; 8], moduli: Option<(f64, f64)>, limits: &mut Limits) -> Option<Law> {
+pub(super) fn spot_weld(f: &[Fields<'_>; 8], moduli: Option<Moduli>, limits: &mut Limits) -> Option<Law> {
     refuse(&f[0], 6, "no mass scaling of the weld", "leave DT blank");
     refuse(&f[0], 7, "no time at which the weld fails", "leave TFAIL blank");
     for (i, name) in (1..).zip(["NRR", "NRS", "NRT", "MRR", "MSS", "MTT"]) {
@@ -38,7 +88,7 @@ pub(super) fn spot_weld(f: &[Fields<'_>; 8], moduli: Option<(f64, f64)>, limits:
 }
 
 /// `*MAT_CABLE_DISCRETE_BEAM`: Young's modulus and no lateral strain, so that the section stays as the cable is drawn.
-pub(super) fn cable(f: &Fields<'_>) -> (Option<(f64, f64)>, Option<Law>) {
+pub(super) fn cable(f: &Fields<'_>) -> Said {
     for (i, expected) in [
         (3, "LCID 0: cables are elastic"),
         (5, "TMAXF0 0: F0 is there at the start, and follows the length from then on"),
@@ -47,15 +97,22 @@ pub(super) fn cable(f: &Fields<'_>) -> (Option<(f64, f64)>, Option<Law>) {
     ] {
         refuse(f, i, expected, "leave it blank");
     }
-    let elastic = f.positive(2, "Young's modulus").map(|young| (young, 0.0));
-    (elastic, Some(Law::Cable { tension: not_negative(f, 4) }))
+    let moduli = f.positive(2, "Young's modulus").map(|young| (young, 0.0));
+    super::elastic(moduli, Some(Law::Cable { tension: not_negative(f, 4) }))
 }
 
 /// Up to here SIGY of a power law is a strain, above it a stress.
 const STRAIN_OF_SIGY: f64 = 0.02;
 
 /// `*MAT_POWER_LAW_PLASTICITY`: two cards.
-pub(super) fn power_law(f: &[Fields<'_>; 8], moduli: Option<(f64, f64)>) -> Option<Law> {
+pub(super) fn power_law(
+    f: &[Fields<'_>; 8],
+    moduli: Option<Moduli>,
+    limits: &mut Limits,
+    log: &Log<'_>,
+) -> Option<Law> {
+    warn_of_vp(&f[1], 1, log);
+    limits.read_failure_strain(&f[1], 2, "EPSF");
     let [k, n] = [(4, "K"), (5, "N")].map(|(i, what)| f[0].positive(i, what));
     let [reference, exponent] = [6, 7].map(|i| not_negative(&f[0], i));
     let given = not_negative(&f[1], 0);
@@ -89,76 +146,6 @@ pub(super) fn power_law(f: &[Fields<'_>; 8], moduli: Option<(f64, f64)>) -> Opti
     Some(Law::Strength(strength))
 }
 
-/// `*MAT_MODIFIED_JOHNSON_COOK`: five cards and one of critical values, with the moduli of the first.
-pub(super) fn modified_johnson_cook(
-    f: &[Fields<'_>; 8],
-    moduli: Option<(f64, f64)>,
-    limits: &mut Limits,
-) -> Option<Law> {
-    refuse(&f[0], 4, "no damage in the yield stress", "leave BETA blank");
-    refuse(&f[0], 7, "no thermal expansion", "leave ALPHA blank");
-    refuse(
-        &f[1],
-        4,
-        "the law of Johnson and Cook",
-        "leave FLAG1 blank, or take *MAT_MODIFIED_ZERILLI_ARMSTRONG",
-    );
-    let share = f[0].within(5, 0.0, Range::Within(-f64::MIN_POSITIVE, 1.0, "a number from 0 to 1"));
-    let heat = f[0].real(6, 0.0);
-    let [rate0, a] = [f[1].positive(0, "E0DOT"), f[2].positive(0, "A")];
-    let (t_room, t_melt) = (f[1].real(1, 0.0), f[1].real(2, 0.0));
-    let (n, m) = (f[2].real(2, 0.0), f[2].real(4, 0.0));
-    let is_warmed = share > 0.0 && heat > 0.0 && m > 0.0;
-    if is_warmed && !(0.0 < t_room && t_room < t_melt) {
-        f[1].fault(2, "a melting temperature above room temperature, both in K", "correct TR or TM");
-        return None;
-    }
-    let start = f[1].real(3, 0.0);
-    if start != 0.0 && start != t_room {
-        f[1].fault(3, "room temperature at the start", "give T0 as TR");
-    }
-    if is_warmed {
-        limits.read_temperature(&f[5], 0, "TC", t_melt);
-    }
-    // A stress that no element comes to stands for none.
-    if let (Some(a), shear) = (a, f[5].real(1, 0.0))
-        && shear != 0.0
-        && shear < 100.0 * a
-    {
-        f[5].fault(1, "no shear stress at which elements leave", "leave TAUC blank");
-    }
-    let mut failure = Failure::None;
-    if f[1].real(5, 0.0) == 0.0 {
-        if let Some(i) = (2..7).find(|i| f[4].real(*i, 0.0) != 0.0) {
-            f[4].fault(i, "the fracture criterion of Cockcroft and Latham", "give FLAG2 1 and WC");
-        }
-    } else {
-        let work = f[4].positive(1, "WC")?;
-        failure = Failure::CockcroftLatham { work };
-        limits.by_failure(f[4].origin(1, "WC"));
-    }
-    let (young, poisson) = moduli?;
-    let law = ModifiedJohnsonCook {
-        shear: young / (2.0 * (1.0 + poisson)),
-        a: a?,
-        b: not_negative(&f[2], 1),
-        n: if n > 0.0 { n } else { 1.0 },
-        q1: not_negative(&f[3], 0),
-        c1: not_negative(&f[3], 1),
-        q2: not_negative(&f[3], 2),
-        c2: not_negative(&f[3], 3),
-        c: not_negative(&f[2], 3),
-        m: if is_warmed { m } else { 1.0 },
-        t_melt: if is_warmed { t_melt } else { COLD[1] },
-        t_room: if is_warmed { t_room } else { COLD[0] },
-        specific_heat: if is_warmed { heat } else { COLD_HEAT },
-        rate0: rate0?,
-        taylor_quinney: if is_warmed { share } else { 0.0 },
-    };
-    let eos = Eos::Linear { bulk: young / (3.0 * (1.0 - 2.0 * poisson)) };
-    Some(Law::Whole { strength: Strength::ModifiedJohnsonCook(law), eos, failure, given: "E and PR" })
-}
-
 /// From here on a cut-off stands for none.
 const NEVER: f64 = 1e15;
 
@@ -169,9 +156,7 @@ pub(super) fn zerilli_armstrong(f: &[Fields<'_>; 8], limits: &mut Limits, log: &
     if cut_off != 0.0 && cut_off.abs() < NEVER {
         f[0].fault(6, "no pressure cut-off", "leave PC blank, or give -1e30");
     }
-    if f[1].real(7, 0.0) != 0.0 {
-        log.warn(f[1].place(7), "VP: the rate of the whole deviatoric strain is used, as with VP 0");
-    }
+    warn_of_vp(&f[1], 7, log);
     limits.read_failure_strain(&f[1], 6, "EFAIL");
     if !matches!(f[2].real(0, 1.0), 0.0 | 1.0) {
         f[2].fault(0, "hardening that does not depend on temperature", "give B1 1 and leave B2 and B3 blank");
