@@ -1,10 +1,10 @@
 //! What acts on bodies from outside beside walls: curves of time, nodal forces, gravity, loads on faces, relaxation.
 //!
 //! Velocities are prescribed for a step, forces act at its start, as central differences have them; both are means over the time for
-//! which they stand, so that a pulse gives its impulse and a motion its way however long the steps are. Pressures on faces, which have to be
-//! known before the step is, take the last step for the next; blasts are those of an instant. Forces
-//! on nodes, gravity and relaxation are put in where nodes are integrated (`nodes.rs`), alike on every holder of a node;
-//! loads on faces are nodal forces of the block that has the element (`load/face.rs`), rounded like its corner forces.
+//! which they stand, so that a pulse gives its impulse and a motion its way however long the steps are. Pressures on faces and blasts, which
+//! have to be known before the step is, take the last step for the next. Forces on nodes, gravity and relaxation are put in where nodes
+//! are integrated (`nodes.rs`), alike on every holder of a node; loads on faces are nodal forces of the block that has the element
+//! (`load/face.rs`), rounded like its corner forces.
 
 pub mod blast;
 pub(crate) mod face;

@@ -139,10 +139,23 @@ impl Wave {
             return self.negative.pressures(since - self.duration);
         }
         let s = since / self.duration;
+        [0, 1].map(|i| self.peaks[i] * (1.0 - s) * exp(Scalar(-self.decay(i) * s)).0)
+    }
+
+    /// Impulses of both from a time after the arrival until another; none before it.
+    pub fn impulses_within(&self, times: [f64; 2]) -> [f64; 2] {
+        let below = times.map(|since| self.negative.impulses_until(since - self.duration));
         [0, 1].map(|i| {
-            let decay = decay(self.impulses[i] / (self.peaks[i] * self.duration));
-            self.peaks[i] * (1.0 - s) * exp(Scalar(-decay * s)).0
+            let decay = self.decay(i);
+            let [from, until] =
+                times.map(|since| begun_phase(decay, (since / self.duration).clamp(0.0, 1.0)));
+            (self.peaks[i] * self.duration).mul_add(until - from, below[0][i] - below[1][i])
         })
+    }
+
+    /// The b of the incident or of the reflected positive phase.
+    fn decay(&self, which: usize) -> f64 {
+        decay(self.impulses[which] / (self.peaks[which] * self.duration))
     }
 }
 
@@ -163,6 +176,12 @@ fn positive_phase(b: f64) -> [f64; 2] {
     let inverse = 1.0 / b;
     let value = inverse * (1.0 - inverse * (1.0 - e));
     [value, inverse * inverse * (2.0 * inverse * (1.0 - e) - 1.0 - e)]
+}
+
+/// `integral of (1 - t) e^(-b t)` from 0 to s; `1 - s u = (1 - s) + s (1 - u)` for t = s u.
+fn begun_phase(b: f64, s: f64) -> f64 {
+    let [whole, _] = positive_phase(b * s);
+    s * (1.0 - s).mul_add(1.0 - b * s * whole, s * whole)
 }
 
 /// Most Newton steps for a decay.
@@ -208,21 +227,29 @@ impl Charge {
         Wave::at(self.burst, scaled, self.root).peaks[1] / self.units[2]
     }
 
-    /// Pressure on a face with its centre at `x` and this outward normal of unit length (stress).
-    pub fn pressure(&self, x: [f64; 3], normal: [f64; 3], time: f64) -> f64 {
+    /// Mean pressure from a time on until another on a face with its centre at `x` and this outward normal of unit length (stress); that of an
+    /// instant where both are the same.
+    pub fn pressure(&self, x: [f64; 3], normal: [f64; 3], [from, until]: [f64; 2]) -> f64 {
         let scaled = self.scaled_distance(x);
-        if !self.span.holds(time) || scaled > FARTHEST || scaled == 0.0 {
+        let ends = until.min(self.span.until);
+        if from >= self.span.until || scaled > FARTHEST || scaled == 0.0 {
             return 0.0;
         }
         let [metres, milliseconds, kilopascals] = self.units;
         let wave = Wave::at(self.burst, scaled, self.root);
-        let since = (time - self.span.from) * milliseconds - wave.arrival;
-        if since < 0.0 || (since >= wave.duration && !self.negative) {
+        let since = [from, ends].map(|time| (time - self.span.from) * milliseconds - wave.arrival);
+        let over = if self.negative { f64::INFINITY } else { wave.duration };
+        if since[1] < 0.0 || since[0] >= over {
             return 0.0;
         }
         let way: [f64; 3] = std::array::from_fn(|a| self.point[a] - x[a]);
         let cosine = dot(way, normal) * metres / (scaled * self.root);
-        let [incident, reflected] = wave.pressures(since);
+        let [incident, reflected] = if until > from {
+            wave.impulses_within(since.map(|since| since.min(over)))
+                .map(|impulse| impulse / ((until - from) * milliseconds))
+        } else {
+            wave.pressures(since[0])
+        };
         let pressure = if cosine > 0.0 {
             let square = cosine * cosine;
             reflected.mul_add(square, incident * (1.0 + square - 2.0 * cosine))
@@ -367,7 +394,7 @@ mod tests {
         let wave = Wave::at(Burst::Surface, 2.0, 2.0);
         let after = wave.arrival + 1e-9;
         let near = |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-6, "{found} {wanted}");
-        let at = |normal: [f64; 3], time: f64| ground.pressure([0.0; 3], normal, time);
+        let at = |normal: [f64; 3], time: f64| ground.pressure([0.0; 3], normal, [time; 2]);
         near(at([0.0, 0.0, 1.0], after), wave.peaks[1] * 1e-6);
         near(at([1.0, 0.0, 0.0], after), wave.peaks[0] * 1e-6);
         near(at([0.0, 0.0, -1.0], after), wave.peaks[0] * 1e-6);
@@ -377,14 +404,51 @@ mod tests {
         assert_eq!(at([0.0, 0.0, 1.0], wave.arrival + 1.01 * wave.duration), 0.0);
         let sucking = |normal: [f64; 3], share: f64| {
             let time = wave.arrival + wave.duration + share * wave.negative.duration;
-            charge(Burst::Surface, true).pressure([0.0; 3], normal, time)
+            charge(Burst::Surface, true).pressure([0.0; 3], normal, [time; 2])
         };
         near(sucking([0.0, 0.0, 1.0], 1.0 / 3.0), -wave.negative.peak * 1e-6);
         near(sucking([0.0, 0.0, -1.0], 1.0 / 3.0), -0.5 * wave.negative.peak * 1e-6);
         assert_eq!((sucking([0.0, 0.0, 1.0], 1.001), sucking([0.0, 0.0, 1.0], 50.0)), (0.0, 0.0));
         let late = Charge { span: Span { from: 5.0, until: 9.0 }, ..ground };
-        near(late.pressure([0.0; 3], [0.0, 0.0, 1.0], 5.0 + after), wave.peaks[1] * 1e-6);
-        assert_eq!(late.pressure([0.0; 3], [0.0, 0.0, 1.0], 9.0), 0.0);
-        assert_eq!(ground.pressure([0.0, 0.0, 90_000.0], [0.0, 0.0, -1.0], 1e3), 0.0);
+        near(late.pressure([0.0; 3], [0.0, 0.0, 1.0], [5.0 + after; 2]), wave.peaks[1] * 1e-6);
+        assert_eq!(late.pressure([0.0; 3], [0.0, 0.0, 1.0], [9.0; 2]), 0.0);
+        assert_eq!(ground.pressure([0.0, 0.0, 90_000.0], [0.0, 0.0, -1.0], [1e3; 2]), 0.0);
+    }
+
+    #[test]
+    fn steps_of_any_length_give_a_face_the_impulse_of_the_wave() {
+        let normal = [0.0, 0.0, 1.0];
+        for burst in [Burst::Air, Burst::Surface] {
+            let wave = Wave::at(burst, 2.0, 2.0);
+            let below = wave.negative.impulses()[1];
+            for (negative, wanted) in [(false, wave.impulses[1]), (true, wave.impulses[1] - below)] {
+                let charge = charge(burst, negative);
+                let end = wave.arrival + wave.duration + wave.negative.duration;
+                for steps in [1, 2, 7, 100, 10_000] {
+                    let step = 1.1 * end / f64::from(steps);
+                    let at =
+                        |k: u32| charge.pressure([0.0; 3], normal, [k, k + 1].map(|k| f64::from(k) * step));
+                    let impulse = step * (0..steps).map(at).sum::<f64>() * 1e6;
+                    assert!(
+                        (impulse - wanted).abs() < 1e-9 * wave.impulses[1],
+                        "{steps}: {impulse} {wanted}"
+                    );
+                }
+                // Cut off by the end of its span.
+                let until = wave.arrival + 0.5 * wave.duration;
+                let cut = Charge { span: Span { from: 0.0, until }, ..charge };
+                let impulse = end * cut.pressure([0.0; 3], normal, [0.0, end]) * 1e6;
+                assert!((impulse / wave.impulses_within([0.0, 0.5 * wave.duration])[1] - 1.0).abs() < 1e-12);
+                assert!(impulse > 0.5 * wave.impulses[1] && impulse < wave.impulses[1]);
+                assert_eq!(cut.pressure([0.0; 3], normal, [until, end]), 0.0);
+            }
+            // A short step has the pressure of its middle.
+            for after in [0.1, 0.9, 1.5] {
+                let time = wave.arrival + after * wave.duration;
+                let [mean, instant] = [[time - 1e-5, time + 1e-5], [time; 2]]
+                    .map(|times| charge(burst, true).pressure([0.0; 3], normal, times));
+                assert!((mean / instant - 1.0).abs() < 1e-6, "{after}: {mean} {instant}");
+            }
+        }
     }
 }

@@ -138,7 +138,8 @@ pub(crate) fn apply(
             SurfaceKind::Pressure(drive) => pressed(mean(drive)),
             SurfaceKind::Blast(charge) => {
                 let (centre, normal) = middle(places);
-                pressed(loads.charges[charge as usize].pressure(centre, normal, time))
+                let around = [time - 0.5 * dt, time + 0.5 * dt];
+                pressed(loads.charges[charge as usize].pressure(centre, normal, around))
             }
             SurfaceKind::Moving(load) => moments[load as usize].forces(&places),
             SurfaceKind::Transmit => std::array::from_fn(|c| damped(areas[c], velocities[c], face.impedance)),

@@ -94,6 +94,14 @@ impl Negative {
         [0.5 * reflected, reflected]
     }
 
+    /// Impulses of both, above 0, up to a time after the end of the positive phase; none before it.
+    pub(super) fn impulses_until(&self, since: f64) -> [f64; 2] {
+        let s = (since / self.duration).clamp(0.0, 1.0);
+        // 12 times the integral of s (1 - s)^2
+        let share = s * s * s.mul_add(s.mul_add(3.0, -8.0), 6.0);
+        self.impulses().map(|impulse| impulse * share)
+    }
+
     /// Incident and reflected pressure at a time after the end of the positive phase: none above 0.
     pub(super) fn pressures(&self, since: f64) -> [f64; 2] {
         let s = since / self.duration;
