@@ -17,17 +17,17 @@ use crate::solve::{Workers, example, keyword, solve, without_states};
 
 /// Examples, one for each kind of element and of contact; how many elements it has decides how many cycles are enough.
 pub const CASES: [Case; 11] = [
-    Case { example: "plates-joined", lanes: "avx2", cycles: [2, 32] },
-    Case { example: "plates-joined", lanes: "scalar", cycles: [2, 12] },
-    Case { example: "plates-free-slip", lanes: "avx2", cycles: [2, 32] },
-    Case { example: "taylor-copper", lanes: "avx2", cycles: [100, 300] },
-    Case { example: "sphere-6-km-s", lanes: "avx2", cycles: [2, 32] },
-    Case { example: "explosive-on-plate", lanes: "avx2", cycles: [10, 110] },
-    Case { example: "fragment-on-water-box", lanes: "avx2", cycles: [2, 32] },
-    Case { example: "tube-crush", lanes: "avx2", cycles: [100, 300] },
-    Case { example: "composite-panel", lanes: "avx2", cycles: [10, 60] },
-    Case { example: "table-on-tubes", lanes: "avx2", cycles: [100, 600] },
-    Case { example: "ball-on-shell.k", lanes: "avx2", cycles: [20, 120] },
+    Case { example: "plates-joined", lanes: "avx2", cycles: [2, 12] },
+    Case { example: "plates-joined", lanes: "scalar", cycles: [2, 7] },
+    Case { example: "plates-free-slip", lanes: "avx2", cycles: [2, 12] },
+    Case { example: "taylor-copper", lanes: "avx2", cycles: [100, 200] },
+    Case { example: "sphere-6-km-s", lanes: "avx2", cycles: [2, 17] },
+    Case { example: "explosive-on-plate", lanes: "avx2", cycles: [10, 60] },
+    Case { example: "fragment-on-water-box", lanes: "avx2", cycles: [2, 12] },
+    Case { example: "tube-crush", lanes: "avx2", cycles: [100, 200] },
+    Case { example: "composite-panel", lanes: "avx2", cycles: [10, 30] },
+    Case { example: "table-on-tubes", lanes: "avx2", cycles: [100, 350] },
+    Case { example: "ball-on-shell.k", lanes: "avx2", cycles: [20, 70] },
 ];
 
 /// What is counted.
