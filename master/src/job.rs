@@ -58,7 +58,7 @@ use foresight::Window;
 use frames::{Frame, Frames};
 use numbers::not_a_number;
 use problem::Problem;
-use schedule::{Step, allowed, first_share, step_after};
+use schedule::{Step, allowed, first_share, rigid_limit, step_after};
 use tally::Tally;
 use twice::Twice;
 use verdict::{Account, element_fault};
@@ -351,7 +351,7 @@ impl Job {
             }
             let window = Window { known: None, from: start.time, longest: control.end_time - start.time };
             let (dt, _, _) = allowed(problem, walls, vote, window);
-            Ok(first_share(vote) * dt)
+            Ok((first_share(problem, vote) * dt).min(rigid_limit(problem)))
         })?;
         let at_end = time >= control.end_time || first >= control.end_cycle;
         let store = self.options.asked.snapshot_at == Some(first) && self.epoch.number == 0;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use mechanics::{
     exact::{ENERGY_BITS, FORCE_BITS, MOMENTUM_BITS, Quanta, Quantum},
-    rigid::State,
+    rigid::{State, shape::courant},
     setup::{Control, Setup},
     vote::Vote,
     wall::{Motion, Pose},
@@ -29,7 +29,7 @@ const TURN: f64 = 0.1;
 /// A step grows where its limits are longer than it by this factor. Limits follow the strains of elements, so a step that followed every
 /// rise of theirs would breathe with a body's vibration, two cycles late, and pump what nothing damps: shells.
 const ROOM_TO_GROW: f64 = 1.01;
-/// Share of the allowed time step that a run begins with where bodies hold energy. Where a gas meets a thinner one, the
+/// Share of the allowed time step that a run begins with where bodies hold energy or are tied. Where a gas meets a thinner one, the
 /// first steps raise velocities from nothing, and viscosity with them, before a vote can tell.
 const START: f64 = 0.2;
 /// Whole numbers below it have a next one (`2^53`).
@@ -266,9 +266,23 @@ pub(super) fn output_after(time: f64, period: f64) -> f64 {
     count * period
 }
 
-/// Share of the time step that `vote`, of the time before the first cycle, allows.
-pub(super) fn first_share(vote: &Vote) -> f64 {
-    if vote.parts.iter().any(|part| part.internal > 0.0) { START } else { 1.0 }
+/// Share of the time step that `vote`, of the time before the first cycle, allows. It knows nothing of ties, whose springs bear less.
+pub(super) fn first_share(problem: &Problem, vote: &Vote) -> f64 {
+    let tied = problem.model.setup.contact.as_ref().is_some_and(|contact| !contact.ties.is_empty());
+    if tied || vote.parts.iter().any(|part| part.internal > 0.0) { START } else { 1.0 }
+}
+
+/// The longest step of the first cycle that rigid bodies bear which may begin in contact: that of their elements. Whatever deforms asks for
+/// about as much by itself; the limit of contact comes with the vote of that cycle.
+pub(super) fn rigid_limit(problem: &Problem) -> f64 {
+    let (mesh, setup) = (&problem.model.mesh, &problem.model.setup);
+    if setup.contact.is_none() {
+        return f64::INFINITY;
+    }
+    let mut parts: Vec<u32> = setup.bodies.iter().flat_map(|body| &body.parts).copied().collect();
+    parts.sort_unstable();
+    courant(mesh, &setup.materials, &parts)
+        .map_or(f64::INFINITY, |(limit, _)| setup.control.safety_factor * limit)
 }
 
 /// The step after `before`, what limits it, and the element if one does; `known` is the length of the step of the vote, the one before

@@ -308,17 +308,17 @@ pub fn courant(mesh: &Mesh, materials: &[Material], parts: &[u32]) -> Option<(f6
     let mut least: Option<(f64, u32)> = None;
     let mut element = 0;
     for (p, part) in (0..).zip(&mesh.parts) {
-        let material = &materials[part.material as usize];
-        let sound = material.sound_speed();
-        for e in 0..part.n_elements() {
-            if parts.binary_search(&p).is_ok() {
-                let x = part.corners_at(e, &mesh.positions);
-                let limit = least_height(part, e, &x) / sound;
-                if least.is_none_or(|(other, _)| limit < other) {
-                    least = Some((limit, element));
-                }
+        let first = element;
+        element += part.n_elements() as u32;
+        if parts.binary_search(&p).is_err() {
+            continue;
+        }
+        let sound = materials[part.material as usize].sound_speed();
+        for (e, element) in (0..part.n_elements()).zip(first..) {
+            let limit = least_height(part, e, &part.corners_at(e, &mesh.positions)) / sound;
+            if least.is_none_or(|(other, _)| limit < other) {
+                least = Some((limit, element));
             }
-            element += 1;
         }
     }
     least
