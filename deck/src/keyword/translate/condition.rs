@@ -56,7 +56,7 @@ pub(super) fn write_held(t: &mut Translation<'_>) {
         group.0 = group.0.min(at);
         group.1.push(node);
     }
-    for ((span, axes), (at, nodes)) in groups {
+    for (n, ((span, axes), (at, nodes))) in (1..).zip(groups) {
         let [from, until] = span.map(f64::from_bits);
         let clamp_span = Span { from, until };
         let [letters, turns] =
@@ -65,10 +65,8 @@ pub(super) fn write_held(t: &mut Translation<'_>) {
             (letters, "") => format!("held {letters}"),
             (letters, turns) => format!("held {letters} turned {turns}"),
         };
-        let name = match clamp_span == Span::ALWAYS {
-            true => name,
-            false => format!("{name} from {from} until {until}"),
-        };
+        // By number: two times may have more digits than a name has room for.
+        let name = if clamp_span == Span::ALWAYS { name } else { format!("{name} in span {n}") };
         let still = Drive { span: clamp_span, ..Drive::constant(0.0) };
         let velocity = axes[0].map(|held| held.then(|| still.clone()));
         let clamped = (0..3).filter(|a| axes[1][*a]).fold(0, |bits, a| bits | 1 << a);

@@ -59,6 +59,13 @@ fn supports_have_a_birth_and_a_death() {
     let by_set = "*SET_NODE_LIST\n7\n3,4\n*BOUNDARY_SPC_SET_BIRTH_DEATH_ID\n1,one\n7,0,0,1\n2e-7,5e-7\n";
     assert_eq!(held(&good(by_set), 4).velocity[1].expect("held").span, SPAN);
     assert!(fault("*BOUNDARY_SPC_NODE_BIRTH_DEATH\n1,0,1\n5e-7,2e-7\n").contains("a death after the birth"));
+    // A birth alone, and times of many digits, are names of sets that can be read again.
+    let born = good("*BOUNDARY_SPC_NODE_BIRTH_DEATH\n1,0,1,1,1\n2e-7,\n2,0,1\n3e-7,1e20\n");
+    assert_eq!(held(&born, 1).velocity[0].expect("held").span, Span { until: Span::ALWAYS.until, ..SPAN });
+    assert_eq!(held(&born, 2).velocity[0].expect("held").span.from, 3e-7);
+    let long =
+        good("*BOUNDARY_SPC_NODE_BIRTH_DEATH\n1,0,1,1,1\n1.2345678901234567e-37,1.2345678901234567e14\n");
+    assert_eq!(held(&long, 1).velocity[2].expect("held").span.until, 1.2345678901234567e14);
     let both = "*BOUNDARY_SPC_NODE\n1,0,1\n*BOUNDARY_SPC_NODE_BIRTH_DEATH\n1,0,1\n2e-7,5e-7\n";
     assert!(fault(both).contains("take the nodes out of one of the two"), "{}", fault(both));
 }
