@@ -1,10 +1,13 @@
 //! Bodies: parts that hang together by shared nodes, ties or rigid bodies, and when two of them meet if nothing turns them aside.
 
-use mechanics::wall::{Motion, Shape};
+use mechanics::{
+    contact::ROUNDING,
+    wall::{Motion, Shape},
+};
 
 use super::Measured;
 use crate::{
-    geometry::{dot, sub},
+    geometry::{dot, norm, sub},
     model::Model,
 };
 
@@ -77,11 +80,11 @@ impl Body {
         format!("{kind} {}{}", names.join(", "), if self.parts.len() > 3 { " and others" } else { "" })
     }
 
-    /// When its box comes to that of another, both going on as they start; never, if they pass each other or part.
-    pub(super) fn meets(&self, other: &Self, relative: [f64; 3]) -> Option<f64> {
+    /// When its box comes `within` a distance of that of another, both going on as they start; never, if they pass each other or part.
+    pub(super) fn meets(&self, other: &Self, relative: [f64; 3], within: f64) -> Option<f64> {
         let (mut from, mut to) = (0.0_f64, f64::INFINITY);
         for a in 0..3 {
-            let (gap, depth) = (other.low[a] - self.high[a], other.high[a] - self.low[a]);
+            let (gap, depth) = (other.low[a] - self.high[a] - within, other.high[a] - self.low[a] + within);
             let v = relative[a];
             if v == 0.0 {
                 if gap > 0.0 || depth < 0.0 {
@@ -93,8 +96,8 @@ impl Body {
             from = from.max(times[0].min(times[1]));
             to = to.min(times[0].max(times[1]));
         }
-        // Boxes that touch and part have met.
-        (from <= to && to > 0.0).then_some(from)
+        // Boxes that touch and part have met, and do no more.
+        (from <= to && to * norm(relative) > ROUNDING * within).then_some(from)
     }
 
     /// When it comes to a wall that it feels; at once where that cannot be told.

@@ -262,25 +262,28 @@ fn meetings(model: &Model, measured: &[Measured], bodies: &[Body], doubts: &mut 
     let end = model.setup.control.end_time;
     let time = Units::named(&model.units).map_or("", |units| units.symbols[2]);
     let is_driven = is_driven(model);
-    let permits = |a: usize, b: usize| {
-        let contact = model.setup.contact.as_ref();
-        let pairs = bodies[a].parts.iter().flat_map(|&p| bodies[b].parts.iter().map(move |&q| (p, q)));
-        contact.is_some_and(|contact| pairs.clone().any(|(p, q)| contact.permits(p as u32, q as u32)))
+    // How near bodies that may meet come to each other before they do.
+    let gap = |a: usize, b: usize| {
+        let contact = model.setup.contact.as_ref()?;
+        let mut pairs = bodies[a].parts.iter().flat_map(|&p| bodies[b].parts.iter().map(move |&q| (p, q)));
+        pairs.any(|(p, q)| contact.permits(p as u32, q as u32)).then_some(contact.gap)
     };
     for a in 0..bodies.len() {
         let Some(velocity) = bodies[a].velocity else { continue };
         let mut met: Vec<(usize, f64)> = Vec::new();
         let mut unknown = false;
         for b in (0..bodies.len()).filter(|&b| b != a) {
+            let gap = gap(a, b);
             let Some(other) = bodies[b].velocity else {
-                unknown |= permits(a, b);
+                unknown |= gap.is_some();
                 continue;
             };
             let relative = sub(velocity, other);
             let moves = norm(relative) > 0.0;
             // What flies beside it may be stopped, and then meets it.
-            unknown |= !moves && permits(a, b);
-            let Some(when) = bodies[a].meets(&bodies[b], relative).filter(|_| moves) else { continue };
+            unknown |= !moves && gap.is_some();
+            let meeting = bodies[a].meets(&bodies[b], relative, gap.unwrap_or(0.0));
+            let Some(when) = meeting.filter(|_| moves) else { continue };
             if model.setup.contact.is_none() && when <= end && a < b {
                 doubts.push(format!(
                     "{} and {} meet at {} {time} and pass through each other: the deck has no [contact]; add it, or join them",
@@ -289,7 +292,7 @@ fn meetings(model: &Model, measured: &[Measured], bodies: &[Body], doubts: &mut 
                     short(when)
                 ));
             }
-            if model.setup.contact.is_none() || permits(a, b) {
+            if model.setup.contact.is_none() || gap.is_some() {
                 met.push((b, when));
             }
         }

@@ -122,3 +122,33 @@ fn what_is_strained_at_the_start_moves() {
         assert_eq!(told(&part, more), is_still, "{part}{more}");
     }
 }
+
+/// Sheets of 2 mm whose middles are 1.5 mm apart meet when those are a gap of 1 mm apart, and solids without contact when they touch.
+#[test]
+fn bodies_meet_at_the_gap_of_contact() {
+    let told = |distance: f64, velocity: f64, end: f64, more: &str| {
+        let part = |name: &str, z: f64, speed: f64| {
+            format!(
+                "[[part]]\nname = \"{name}\"\nmaterial = \"STEEL_4340\"\nvelocity = [0, 0, {speed}]\nshell = {{ thickness = 2 }}\n\
+                 plate = {{ origin = [0, 0, {z}], side_i = [20, 0, 0], side_j = [0, 20, 0], cells = [4, 4] }}\n"
+            )
+        };
+        let text = format!(
+            "title = \"s\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = {end}\n{}{}{more}",
+            part("lower", 0.0, 0.0),
+            part("upper", distance, velocity)
+        );
+        let model = deck::read(&text, "s.toml").unwrap_or_else(|faults| panic!("{}\n{text}", faults[0]));
+        forecast(&model).warnings
+    };
+    let fit = "[contact]\ngap_fraction = \"fit\"\n";
+    let late = |warnings: &[String]| warnings.iter().any(|warning| warning.contains("after the end_time"));
+    // The gap is crossed at 0.1 ms, the whole distance at 0.3 ms.
+    assert!(!late(&told(1.5, -5.0, 0.2, fit)), "{:?}", told(1.5, -5.0, 0.2, fit));
+    let early = told(1.5, -5.0, 0.05, fit);
+    assert!(early.iter().any(|w| w.contains("meets part \"lower\" at 0.1 ms")), "{early:?}");
+    assert!(late(&told(1.5, -5.0, 0.2, "")));
+    // What starts at the gap and flies away meets nothing.
+    let away = told(0.5, 5.0, 0.2, "[contact]\ngap_length = 0.5\n");
+    assert!(away.iter().any(|warning| warning.contains("and meets nothing")), "{away:?}");
+}
