@@ -60,6 +60,8 @@ pub(super) struct ContactCard {
     pub(super) edges: bool,
     /// Where nodes of the first are tied to faces of the second.
     pub(super) tied: Option<Tied>,
+    /// IGNORE 1 or 2, and where it stands: nodes may start inside.
+    pub(super) ignores_initial: Option<(Place, i64)>,
 }
 
 /// What becomes of tied nodes.
@@ -90,6 +92,7 @@ impl ContactCard {
         let is_mpp = block.take("_MPP");
         extra += usize::from(is_mpp);
         extra += usize::from(extra == 0 && (block.take("_ID") || block.take("_TITLE")));
+        let mut ignores_initial = if is_mpp { ignoring(block, extra - 1, 0, context) } else { None };
         // The second card of _MPP is there where it begins with a sign that is no parameter.
         extra += usize::from(is_mpp && begins_second_mpp(&block.card(extra).text));
         if block.take("_MORTAR") {
@@ -144,7 +147,9 @@ impl ContactCard {
         let side = |i: usize| Side::read(&f, i, single);
         // The first optional card, behind that of the kind. With SOFT 2 a DEPTH that ends in 5 looks for edges, too.
         let kind_card = word.starts_with("ERODING") || word.contains("TIEBREAK");
-        let optional = context.fields(block.card(extra + 3 + usize::from(kind_card)), block.width, &TENS);
+        let first = extra + 3 + usize::from(kind_card);
+        let optional = context.fields(block.card(first), block.width, &TENS);
+        ignores_initial = ignoring(block, first + 2, 1, context).or(ignores_initial);
         let by_depth = optional.integer(0) == 2 && optional.integer(5).rem_euclid(10) == 5;
         let edges = word == "AUTOMATIC_GENERAL" || by_depth;
         // FSF scales friction.
@@ -169,6 +174,8 @@ impl ContactCard {
         if g.real(3, 0.0) != 0.0 {
             log.warn(g.at, "VC: friction is not bounded by a stress");
         }
+        warn_of_damping(&g, context);
+        warn_of_thickness(&h, word.contains("TIE"), context);
         let second = if single { None } else { Some(side(1)?) };
         let decay = (decay != 0.0 && fixed != moving).then_some((moving, decay));
         let tied = if word.contains("TIEBREAK") {
@@ -178,7 +185,17 @@ impl ContactCard {
         } else {
             word.starts_with("TIED").then(Tied::default)
         };
-        Some(Self { at: f.at, first: side(0)?, second, friction: fixed, decay, erodes, edges, tied })
+        Some(Self {
+            at: f.at,
+            first: side(0)?,
+            second,
+            friction: fixed,
+            decay,
+            erodes,
+            edges,
+            tied,
+            ignores_initial,
+        })
     }
 
     /// Reads `*CONTACT_FORCE_TRANSDUCER_`; none where its surfaces are of a kind that is not known.
@@ -206,6 +223,7 @@ impl ContactCard {
             erodes: false,
             edges: false,
             tied: None,
+            ignores_initial: None,
         })
     }
 }
@@ -213,6 +231,52 @@ impl ContactCard {
 /// Whether a card is the second of `_MPP`.
 fn begins_second_mpp(card: &str) -> bool {
     card.strip_prefix('&').is_some_and(|rest| rest.is_empty() || rest.starts_with([' ', ',']))
+}
+
+/// IGNORE in a field of a card, where it lets nodes start inside.
+pub(super) fn ignoring(
+    block: &Block<'_>,
+    card: usize,
+    i: usize,
+    context: &Context<'_>,
+) -> Option<(Place, i64)> {
+    let f = context.fields(block.card(card), block.width, &TENS);
+    let ignore = f.integer(i);
+    matches!(ignore, 1 | 2).then(|| (f.place(i), ignore))
+}
+
+/// Warns of the damping on the second card.
+fn warn_of_damping(g: &Fields<'_>, context: &Context<'_>) {
+    let damping = g.real(4, 0.0);
+    if damping > 0.0 {
+        let words = format!(
+            "VDC {damping} (field 5 of card 2): contact is not damped by it; only where friction sticks are pushes damped, by as much as they need to come to rest"
+        );
+        context.log.warn(g.place(4), words);
+    }
+}
+
+/// Warns of thicknesses and their factors on the third card.
+fn warn_of_thickness(h: &Fields<'_>, ties: bool, context: &Context<'_>) {
+    let fields = [(2, "SST", 0.0), (3, "MST", 0.0), (4, "SFST", 1.0), (5, "SFMT", 1.0)];
+    let given: Vec<_> = fields
+        .into_iter()
+        .map(|(i, name, usual)| (i, name, usual, h.real(i, 0.0)))
+        .filter(|(_, _, usual, value)| *value != 0.0 && value != usual)
+        .collect();
+    let Some((first, ..)) = given.first() else { return };
+    let named: Vec<String> = given
+        .iter()
+        .map(|(i, name, _, value)| format!("{name} {value} (field {} of card 3)", i + 1))
+        .collect();
+    let instead = if ties {
+        "ties hold nodes within 5 % of the smallest edge"
+    } else {
+        "contact is as thick as its gap: half the thinnest shells, without shells a tenth of the smallest edge, and less where bodies start nearer"
+    };
+    context
+        .log
+        .warn(h.place(*first), format!("{}: {instead}, whatever thickness is given", named.join(", ")));
 }
 
 impl Tied {

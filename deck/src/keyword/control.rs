@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{
     cards::Block,
+    contact::ignoring,
     fields::{Context, TENS},
 };
 use crate::{
@@ -131,6 +132,8 @@ pub(super) struct ControlCards {
     pub(super) viscosity: Option<(Place, [f64; 2])>,
     /// Kind and coefficient of hourglass control.
     pub(super) hourglass: Option<(Place, i64, f64)>,
+    /// IGNORE of contacts that leave theirs blank, and where it stands.
+    pub(super) ignores_initial: Option<(Place, i64)>,
     /// Whether nodes without elements stay in the run.
     pub(super) freed_nodes: Option<(Place, bool)>,
     /// Whether the thickness of shells follows their strains.
@@ -239,6 +242,7 @@ impl ControlCards {
                 }
                 block.ignore(log);
             }
+                self.ignores_initial = ignoring(block, 3, 0, context);
             // The energies that it switches on are always reckoned.
             "CONTROL_ENERGY" => {}
             "CONTROL_DYNAMIC_RELAXATION" => {

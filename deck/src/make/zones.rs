@@ -48,8 +48,8 @@ pub(super) fn overlaps(
             format!("part \"{}\" that meets part \"{}\" ({line}): {how}", parts[b].name, parts[a].name),
             format!("parts at least one gap ({}) apart at the start", short(gap)),
             log.say(
-                "move one of them, join them, or switch the pair off in [[contact.pair]]",
-                "move one of them, or name other parts in the *CONTACT",
+                "move one of them, join them, switch the pair off in [[contact.pair]], or write contact.initial_penetration = \"ignore\"",
+                "move one of them, name other parts in the *CONTACT, or give it IGNORE 1, which is initial_penetration = \"ignore\"",
             ),
         );
     }

@@ -19,6 +19,8 @@ pub(super) fn write(t: &mut Translation<'_>) {
     let problem = t.problem;
     let mut pairs: BTreeMap<(u32, u32), &ContactCard> = BTreeMap::new();
     let mut ties = Vec::new();
+    let sheets: BTreeSet<u32> = problem.shells.iter().map(|shell| shell.part).collect();
+    let mut ignoring = None;
     for contact in &problem.contacts {
         if let Some(tied) = contact.tied {
             let tie = tie_of(contact, tied, t);
@@ -33,13 +35,24 @@ pub(super) fn write(t: &mut Translation<'_>) {
                 continue;
             }
         }
-        let mut meets = false;
+        let (mut meets, mut sheets_meet) = (false, false);
         for (a, b) in pairs_of(contact, t) {
             let known = t.names.contains_key(&a) && t.names.contains_key(&b);
             if known && !t.bodies.same(a, b) {
                 pairs.entry((a, b)).or_insert(contact);
                 meets = true;
+                sheets_meet |= sheets.contains(&a) && sheets.contains(&b);
             }
+        }
+        if sheets_meet {
+            t.log.warn(
+                contact.at,
+                "where shells meet shells, their middles come as near as half the thinnest, so that surfaces overlap by half a thickness; \
+                 LS-DYNA keeps them (t1 + t2) / 2 apart: where that matters, convert the deck and give its [contact] a gap_length of a whole thickness",
+            );
+        }
+        if meets {
+            ignoring = ignoring.or(contact.ignores_initial).or(problem.control.ignores_initial);
         }
         if !meets && contact.tied.is_none() {
             t.log.warn(contact.at, "a contact of no parts with elements that may meet: it does nothing");
@@ -50,6 +63,13 @@ pub(super) fn write(t: &mut Translation<'_>) {
     else {
         return;
     };
+    if let Some((at, ignore)) = ignoring {
+        let words = format!(
+            "IGNORE {ignore}: nodes that start inside another part, or nearer than the gap to it, pass the faces there for the whole run, in every \
+             contact of the deck, where LS-DYNA has them meet from the depth at which they start; move bodies that only touch apart by the gap"
+        );
+        t.log.warn(at, words);
+    }
     write_freed_nodes(t);
     t.met = pairs.keys().copied().collect();
     let decay = the_decay(&pairs, t);
@@ -77,7 +97,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
         stiffness: None,
         friction_velocity: None,
         edges: problem.contacts.iter().any(|contact| contact.edges),
-        ignores_initial: false,
+        ignores_initial: ignoring.is_some(),
     });
 }
 

@@ -139,3 +139,72 @@ fn friction_by_a_table_is_refused() {
     let faults = deck::read(&text, "a.k").expect_err("a table");
     assert!(faults[0].to_string().contains("with FS 2 the field FD is the number"), "{faults:?}");
 }
+
+fn warnings(text: &str) -> Vec<String> {
+    let reading = deck::read_whole(text, "a.k").unwrap_or_else(|faults| panic!("{faults:?}"));
+    reading.warnings.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn thicknesses_and_damping_of_contact_are_told() {
+    let told = |keyword: &str, gap: f64, second: &str, third: &str| {
+        warnings(&deck_of(gap, &format!("*CONTACT_{keyword}\n2,1,3,3\n{second}\n{third}\n"))).join("\n")
+    };
+    let both = "AUTOMATIC_SURFACE_TO_SURFACE";
+    for (second, third) in [("0.2", ""), ("0.2,0.2,0,0,0", "1,1,0,0,1,1.0"), ("", ",,,,0,0")] {
+        assert_eq!(told(both, 1.0, second, third), "");
+    }
+    let thick = told(both, 1.0, "", "1,1,0.2,0,1,0.5");
+    assert!(
+        thick.starts_with("a.k:36: SST 0.2 (field 3 of card 3), SFMT 0.5 (field 6 of card 3): "),
+        "{thick}"
+    );
+    assert!(thick.contains("contact is as thick as its gap"), "{thick}");
+    let tied = told("TIED_SURFACE_TO_SURFACE", 0.0, "", ",,,-0.2");
+    assert!(tied.contains("MST -0.2 (field 4 of card 3): ties hold nodes within 5 %"), "{tied}");
+    let damped = told(both, 1.0, "0.2,0.2,0,0,20", "");
+    assert!(damped.contains("a.k:35: VDC 20 (field 5 of card 2): contact is not damped by it"), "{damped}");
+    assert_eq!(damped.lines().count(), 1, "{damped}");
+}
+
+/// Two sheets of 2 mm, whose middles are 3 apart.
+fn sheets(contact: &str) -> String {
+    format!(
+        "*KEYWORD\n*CONTROL_TERMINATION\n1e-6\n*PART\nbelow\n1,1,1\nabove\n2,1,1\n*SECTION_SHELL\n1,2\n2,2,2,2\n\
+         *MAT_ELASTIC\n1,7.85e-9,2.1e5,0.3\n*NODE\n1,0,0,0\n2,10,0,0\n3,10,10,0\n4,0,10,0\n5,0,0,3\n6,10,0,3\n7,10,10,3\n8,0,10,3\n\
+         *ELEMENT_SHELL\n1,1,1,2,3,4\n2,2,5,6,7,8\n{contact}*END\n"
+    )
+}
+
+#[test]
+fn sheets_that_overlap_by_half_a_thickness_are_told() {
+    let words = "surfaces overlap by half a thickness";
+    for contact in ["SURFACE_TO_SURFACE\n1,2,3,3\n\n\n", "SINGLE_SURFACE\n0\n\n\n"] {
+        let told = warnings(&sheets(&format!("*CONTACT_AUTOMATIC_{contact}")));
+        assert_eq!(told.iter().filter(|warning| warning.contains(words)).count(), 1, "{contact}: {told:?}");
+    }
+    let solids = warnings(&deck_of(1.0, "*CONTACT_AUTOMATIC_SINGLE_SURFACE\n0\n\n\n"));
+    assert!(solids.is_empty(), "{solids:?}");
+}
+
+#[test]
+fn ignore_lets_nodes_start_inside() {
+    let both = "AUTOMATIC_SURFACE_TO_SURFACE";
+    let plain = format!("*CONTACT_{both}\n2,1,3,3\n\n\n");
+    let faults = deck::read(&deck_of(-0.5, &plain), "a.k").expect_err("one is inside the other");
+    assert!(faults[0].to_string().contains("or give it IGNORE 1"), "{faults:?}");
+    for contact in [
+        format!("*CONTACT_{both}\n2,1,3,3\n\n\n0\n,,\n0,1\n"),
+        "*CONTACT_ERODING_SURFACE_TO_SURFACE\n2,1,3,3\n\n\n0,1\n0\n0\n0,2\n".to_string(),
+        format!("*CONTACT_{both}_MPP\n1,200\n2,1,3,3\n\n\n"),
+        format!("*CONTROL_CONTACT\n0\n0\n0\n1\n{plain}"),
+    ] {
+        let text = deck_of(-0.5, &contact);
+        let told = warnings(&text).join("\n");
+        assert_eq!(told.matches("pass the faces there for the whole run").count(), 1, "{contact}: {told}");
+        let settings = super::converted(&text, "a.k").setup.contact.expect("they meet");
+        assert!(settings.ignores_initial, "{contact}");
+    }
+    let text = deck_of(1.0, &plain);
+    assert!(warnings(&text).is_empty() && !good(1.0, &plain).setup.contact.expect("contact").ignores_initial);
+}
