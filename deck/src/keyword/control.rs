@@ -145,6 +145,8 @@ pub(super) struct ControlCards {
     /// THEORY of `*CONTROL_SHELL`: ELFORM of sections that leave it blank.
     pub(super) theory: Option<Placed<i64>>,
     pub(super) period: Option<(Place, f64)>,
+    /// How many states the run is to write, at even times; 0 where the period says when.
+    pub(super) states: u32,
     pub(super) sections: Vec<SectionCard>,
     /// Nodes and sets of nodes whose motion is to be written.
     pub(super) gauges: Vec<(Place, u32)>,
@@ -240,9 +242,9 @@ impl ControlCards {
                         "leave it blank, or say 1 to keep the mass of freed nodes",
                     ),
                 }
+                self.ignores_initial = ignoring(block, 3, 0, context);
                 block.ignore(log);
             }
-                self.ignores_initial = ignoring(block, 3, 0, context);
             // The energies that it switches on are always reckoned.
             "CONTROL_ENERGY" => {}
             "CONTROL_DYNAMIC_RELAXATION" => {
@@ -327,9 +329,16 @@ impl ControlCards {
             "DATABASE_BINARY_D3PLOT" => {
                 block.leave_all();
                 let card = block.card(0);
-                let period = context.fields(card, block.width, &TENS).real(0, 0.0);
+                let f = context.fields(card, block.width, &TENS);
+                let period = f.real(0, 0.0);
                 if period > 0.0 {
                     self.period = Some((card.at, period));
+                }
+                self.states = f.id(3);
+                if f.id(1) != 0 {
+                    context
+                        .log
+                        .warn(f.place(1), "LCDT: no curve says when states are written; DT or NPLTC does");
                 }
             }
             "DATABASE_HISTORY_NODE" => listed(block, context, &mut self.gauges),

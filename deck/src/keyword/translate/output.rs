@@ -19,7 +19,11 @@ const MAX_GAUGES: usize = 100;
 pub(super) fn write(t: &mut Translation<'_>) {
     let (problem, log) = (t.problem, t.log);
     let control = &problem.control;
-    t.deck.output.period = control.period.map(|(_, period)| period);
+    // NPLTC goes over DT.
+    t.deck.output.period = match (control.states, control.end_time) {
+        (1.., Some((_, end))) => Some(end / f64::from(control.states)),
+        _ => control.period.map(|(_, period)| period),
+    };
     if let Some((at, pairs)) = contact::watched(t) {
         let named =
             |pair: [u32; 2]| Placed::new(pair.map(|id| made(t.names[&id].clone(), at)), Origin::card(at));

@@ -380,3 +380,16 @@ fn long_says_how_wide_fields_are() {
     let told = faults(&cube("").replace("*KEYWORD\n", "*KEYWORD LONG=X\n"));
     assert!(told[0].contains("expected LONG=Y, K, S or N"), "{told:?}");
 }
+
+#[test]
+fn states_come_by_their_period_or_their_number() {
+    let told = |card: &str| whole(&cube(&format!("*DATABASE_BINARY_D3PLOT\n{card}\n")));
+    for (card, period) in
+        [("1e-7", 1e-7), (",,,20", 1e-6 / 20.0), ("0,0,0,20", 1e-6 / 20.0), ("1e-7,,,4", 1e-6 / 4.0)]
+    {
+        let (model, warnings) = told(card);
+        assert_eq!((model.output.period, warnings.as_str()), (Some(period), ""), "{card}");
+    }
+    let (model, warnings) = told(",3");
+    assert!(model.output.period.is_none() && warnings.contains("LCDT: no curve says"), "{warnings}");
+}
