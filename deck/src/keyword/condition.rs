@@ -77,11 +77,22 @@ pub(super) struct Force {
 /// A pressure by curve.
 pub(super) struct Pressure {
     pub(super) at: Place,
-    /// Faces by their nodes, or a set of segments.
-    pub(super) faces: Vec<[u32; 4]>,
-    pub(super) set: u32,
+    pub(super) pressed: Pressed,
     pub(super) curve: u32,
     pub(super) factor: f64,
+}
+
+/// What is pressed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Pressed {
+    Segment([u32; 4]),
+    /// A set of segments.
+    Segments(u32),
+    Shell(u32),
+    /// A set of shells.
+    Shells(u32),
+    PartSet(u32),
+    Part(u32),
 }
 
 /// `*LOAD_BODY_X` and its like.
@@ -183,6 +194,8 @@ impl Conditions {
                 | "LOAD_NODE_SET"
                 | "LOAD_SEGMENT"
                 | "LOAD_SEGMENT_SET"
+                | "LOAD_SHELL_ELEMENT"
+                | "LOAD_SHELL_SET"
                 | "LOAD_BODY_X"
                 | "LOAD_BODY_Y"
                 | "LOAD_BODY_Z"
@@ -279,27 +292,22 @@ impl Conditions {
                 self.forces.push(Force { at, target, axis, curve, factor, system });
             }
             "LOAD_SEGMENT" | "LOAD_SEGMENT_SET" => {
-                let (set, i) = if of_set { (f.id(0), 2) } else { (0, 1) };
+                let (set, i) = if of_set { (f.id(0), 1) } else { (0, 0) };
+                let mut face = [3, 4, 5, 6].map(|i| if of_set { 0 } else { f.id(i) });
+                if face[3] == 0 {
+                    face[3] = face[2];
+                }
                 // -2 is the pressure of *LOAD_BLAST.
-                let blasted = f.integer(i - 1) == -2;
-                let curve = if blasted { 0 } else { f.id(i - 1) };
-                if f.real(i + 1, 0.0) != 0.0 {
-                    f.fault(i + 1, "an arrival time of 0", "put it into the curve");
-                }
-                let mut faces = Vec::new();
-                if !of_set {
-                    let mut face = [3, 4, 5, 6].map(|i| f.id(i));
-                    if face[3] == 0 {
-                        face[3] = face[2];
-                    }
-                    faces.push(face);
-                }
-                if blasted {
+                if f.integer(i) == -2 {
+                    no_arrival(f, i + 2);
+                    let faces = if of_set { Vec::new() } else { vec![face] };
                     self.blasted.push(Blasted { at, charge: 0, faces, set });
                 } else {
-                    self.pressures.push(Pressure { at, faces, set, curve, factor: scale(f, i) });
+                    self.pressure(f, i, if of_set { Pressed::Segments(set) } else { Pressed::Segment(face) });
                 }
             }
+            "LOAD_SHELL_ELEMENT" => self.pressure(f, 1, Pressed::Shell(f.id(0))),
+            "LOAD_SHELL_SET" => self.pressure(f, 1, Pressed::Shells(f.id(0))),
             "LOAD_BODY_X" | "LOAD_BODY_Y" | "LOAD_BODY_Z" => {
                 let axis = usize::from(word.as_bytes()[word.len() - 1] - b'X');
                 if f.id(2) != 0 {
@@ -326,6 +334,16 @@ impl Conditions {
                 }
             }
         }
+    }
+
+    /// A pressure whose curve, factor and arrival time begin with field `i`.
+    fn pressure(&mut self, f: &Fields<'_>, i: usize, pressed: Pressed) {
+        if f.integer(i) < 0 {
+            f.fault(i, "the number of a curve", "give a blast its segments by *LOAD_BLAST_SEGMENT");
+            return;
+        }
+        no_arrival(f, i + 2);
+        self.pressures.push(Pressure { at: f.at, pressed, curve: f.id(i), factor: scale(f, i + 1) });
     }
 
     /// A wall of `*RIGIDWALL_PLANAR`, whose cards begin with `first`.
@@ -368,6 +386,13 @@ impl Conditions {
             friction,
             moving,
         });
+    }
+}
+
+/// Reports an arrival time.
+fn no_arrival(f: &Fields<'_>, i: usize) {
+    if f.real(i, 0.0) != 0.0 {
+        f.fault(i, "an arrival time of 0", "put it into the curve");
     }
 }
 

@@ -2,18 +2,10 @@
 
 use super::{
     cards::Block,
+    condition::Pressed,
     fields::{Context, TENS},
 };
 use crate::place::{Place, Placed};
-
-/// What is pressed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Pressed {
-    Segments(u32),
-    Shells(u32),
-    PartSet(u32),
-    Part(u32),
-}
 
 /// A nozzle and what it presses.
 pub(super) struct Nozzle {

@@ -8,10 +8,11 @@ use super::{element::corners_of, moving::is_of_nozzle, reference, state::Transla
 use crate::{
     geometry::{dot, key_of_face, sub, unit},
     keyword::{
-        condition::{AXES_OF_CODE, Held, Target},
+        condition::{AXES_OF_CODE, Held, Pressed, Target},
         prescribed::{Driven, Meaning, Way},
         problem::Problem,
     },
+    log::Log,
     place::Place,
     typed::condition::{
         Boundary, BoundaryKind, Circle, Components, Drive, Faces, Gravity, Load, LoadKind, Lumped, Parts,
@@ -312,35 +313,87 @@ fn push_load(t: &mut Translation<'_>, at: Place, title: &str, kind: LoadKind) {
     t.deck.loads.push(Load { at, title: title.to_string(), parts: Parts::All, kind });
 }
 
-/// The nodes of each outer face as they stand around its outward normal: of solids, and of shells, whose upper side is the outer one, where
-/// they are wanted.
-pub(super) struct Outward(HashMap<[u32; 4], [u32; 4]>);
+/// The nodes of each outer face as they stand around its outward normal: of solids, and of shells, whose upper side is the outer one.
+pub(super) struct Outward {
+    faces: HashMap<[u32; 4], [u32; 4]>,
+    /// Nodes of shells by their numbers.
+    shells: HashMap<u32, [u32; 4]>,
+}
 
 impl Outward {
-    pub(super) fn of(problem: &Problem, of_shells: bool) -> Self {
-        let mut outward: HashMap<[u32; 4], [u32; 4]> = HashMap::new();
+    pub(super) fn of(problem: &Problem) -> Self {
+        let mut faces: HashMap<[u32; 4], [u32; 4]> = HashMap::new();
         for solid in &problem.solids {
             let corners = corners_of(solid.nodes);
             for face in mechanics::mesh::FACES.map(|face| face.map(|c| corners[c])) {
                 // An element that repeats corners has drawn some of its faces to an edge.
                 let Some(key) = key_of_face(face) else { continue };
                 // A face of two elements is inside, and no pressure acts there.
-                if outward.insert(key, face).is_some() {
-                    outward.remove(&key);
+                if faces.insert(key, face).is_some() {
+                    faces.remove(&key);
                 }
             }
         }
-        for shell in problem.shells.iter().filter(|_| of_shells) {
+        for shell in &problem.shells {
             if let Some(key) = key_of_face(shell.nodes) {
-                outward.entry(key).or_insert(shell.nodes);
+                faces.entry(key).or_insert(shell.nodes);
             }
         }
-        Self(outward)
+        Self { faces, shells: problem.shells.iter().map(|shell| (shell.id, shell.nodes)).collect() }
     }
 
-    /// Whether the nodes of a segment stand around the outward normal of its face; none where it is no outer face.
-    pub(super) fn is_outward(&self, segment: [u32; 4]) -> Option<bool> {
-        let face = self.0.get(&key_of_face(segment)?)?;
+    /// Whether the nodes of a segment stand around the outward normal of its face; none, and a fault, where it is no outer face.
+    pub(super) fn is_outward(&self, segment: [u32; 4], at: Place, log: &Log<'_>) -> Option<bool> {
+        let outward = self.find(segment);
+        if outward.is_none() {
+            log.fault(
+                at,
+                format!("segment {segment:?}"),
+                "an outer face of a solid, or a shell",
+                "name its four nodes, or the three of a triangle",
+            );
+        }
+        outward
+    }
+
+    /// The segments that a load presses.
+    pub(super) fn pressed(
+        &self,
+        problem: &Problem,
+        pressed: Pressed,
+        at: Place,
+        log: &Log<'_>,
+    ) -> Vec<[u32; 4]> {
+        let shell = |id: u32| {
+            let found = self.shells.get(&id).copied();
+            if found.is_none() {
+                log.fault(at, format!("shell {id}"), "a shell of the deck", "correct the number");
+            }
+            found
+        };
+        let of_parts = |parts: &[u32]| {
+            if let Some(part) = parts.iter().find(|id| !problem.shells.iter().any(|shell| shell.part == **id))
+            {
+                let read = format!("part {part} without shells under a *LOAD_MOVING_PRESSURE");
+                log.fault(at, read, "parts of shells", "name a set of segments of solids");
+            }
+            let of = problem.shells.iter().filter(|shell| parts.contains(&shell.part));
+            of.map(|shell| shell.nodes).collect()
+        };
+        match pressed {
+            Pressed::Segment(face) => vec![face],
+            Pressed::Segments(set) => problem.segment_set(set, at, log),
+            Pressed::Shell(id) => shell(id).into_iter().collect(),
+            Pressed::Shells(set) => {
+                problem.element_set(1, set, at, log).into_iter().filter_map(shell).collect()
+            }
+            Pressed::PartSet(set) => of_parts(&problem.part_set(set, at, log)),
+            Pressed::Part(part) => of_parts(&[part]),
+        }
+    }
+
+    fn find(&self, segment: [u32; 4]) -> Option<bool> {
+        let face = self.faces.get(&key_of_face(segment)?)?;
         let start = face.iter().position(|node| *node == segment[0])?;
         let next = (1..4).map(|i| face[(start + i) % 4]).find(|node| *node != segment[0]);
         let second = segment.into_iter().find(|node| *node != segment[0]);
@@ -354,23 +407,13 @@ pub(super) fn write_pressures(t: &mut Translation<'_>) {
     if problem.conditions.pressures.is_empty() {
         return;
     }
-    let outward = Outward::of(problem, false);
+    let outward = Outward::of(problem);
     // Faces by curve, factor and side.
     type Group = (Place, Vec<[u32; 4]>);
     let mut groups: BTreeMap<(u32, u64), Group> = BTreeMap::new();
     for given in &problem.conditions.pressures {
-        let faces =
-            if given.set == 0 { given.faces.clone() } else { problem.segment_set(given.set, given.at, log) };
-        for face in faces {
-            let Some(same) = outward.is_outward(face) else {
-                log.fault(
-                    given.at,
-                    format!("segment {face:?}"),
-                    "an outer face of a solid",
-                    "name its four nodes, or the three of a triangle",
-                );
-                continue;
-            };
+        for face in outward.pressed(problem, given.pressed, given.at, log) {
+            let Some(same) = outward.is_outward(face, given.at, log) else { continue };
             let factor = if same { given.factor } else { -given.factor };
             let group = groups.entry((given.curve, factor.to_bits())).or_insert((given.at, Vec::new()));
             group.1.push(face);

@@ -8,7 +8,7 @@ use crate::{
     geometry::{norm, sub},
     keyword::{
         condition::Target,
-        moving::{Nozzle, Pressed},
+        moving::Nozzle,
         prescribed::{Meaning, Motion, Way},
         rigid::BodyNodes,
     },
@@ -23,7 +23,7 @@ pub(super) fn write(t: &mut Translation<'_>) {
     if problem.nozzles.is_empty() {
         return;
     }
-    let outward = Outward::of(problem, true);
+    let outward = Outward::of(problem);
     for (n, nozzle) in (1..).zip(&problem.nozzles) {
         let at = nozzle.at;
         let sides = segments(t, nozzle, &outward);
@@ -83,40 +83,13 @@ fn moves(t: &Translation<'_>, motion: &Motion, node: u32) -> bool {
 /// The segments that a nozzle presses: those that are listed outward, and those inward.
 fn segments(t: &Translation<'_>, nozzle: &Nozzle, outward: &Outward) -> [Vec<[u32; 4]>; 2] {
     let (problem, log, at) = (t.problem, t.log, nozzle.at);
-    let of_parts = |parts: &[u32]| {
-        if let Some(part) = parts.iter().find(|id| !problem.shells.iter().any(|shell| shell.part == **id)) {
-            let read = format!("part {part} without shells under a *LOAD_MOVING_PRESSURE");
-            log.fault(at, read, "parts of shells", "name a set of segments of solids");
-        }
-        let of = problem.shells.iter().filter(|shell| parts.contains(&shell.part));
-        of.map(|shell| shell.nodes).collect::<Vec<_>>()
-    };
-    let faces = match nozzle.pressed {
-        Pressed::Segments(set) => problem.segment_set(set, at, log),
-        Pressed::Shells(set) => {
-            let mut named = problem.element_set(1, set, at, log);
-            named.sort_unstable();
-            let of = problem.shells.iter().filter(|shell| named.binary_search(&shell.id).is_ok());
-            of.map(|shell| shell.nodes).collect()
-        }
-        Pressed::PartSet(set) => of_parts(&problem.part_set(set, at, log)),
-        Pressed::Part(part) => of_parts(&[part]),
-    };
+    let faces = outward.pressed(problem, nozzle.pressed, at, log);
     if faces.is_empty() && log.count() == 0 {
         log.fault(at, "a *LOAD_MOVING_PRESSURE on nothing", "at least one segment", "correct ID and IDT");
     }
     let mut sides = [Vec::new(), Vec::new()];
     for face in faces {
-        let Some(same) = outward.is_outward(face) else {
-            let expected = "an outer face of a solid, or a shell";
-            log.fault(
-                at,
-                format!("segment {face:?}"),
-                expected,
-                "name its four nodes, or the three of a triangle",
-            );
-            continue;
-        };
+        let Some(same) = outward.is_outward(face, at, log) else { continue };
         sides[usize::from(!same)].push(face);
     }
     sides

@@ -4,6 +4,7 @@ use deck::{
     Model, Reading,
     bundle::{self, Options},
 };
+use mechanics::load::SurfaceKind;
 
 use super::{cube, fault, good, lines, read};
 
@@ -392,4 +393,32 @@ fn states_come_by_their_period_or_their_number() {
     }
     let (model, warnings) = told(",3");
     assert!(model.output.period.is_none() && warnings.contains("LCDT: no curve says"), "{warnings}");
+}
+
+#[test]
+fn pressure_acts_on_shells_against_the_normal_of_their_segments() {
+    let curve = "*DEFINE_CURVE\n5\n0,1\n1,1\n*SET_SHELL_LIST\n7\n1\n*SET_SEGMENT\n8\n4,3,2,1\n";
+    let of = |load: &str| sheet("*SECTION_SHELL\n1,2\n0.5\n", SHELL, &format!("{curve}*LOAD_{load}\n"));
+    for (load, factor) in [
+        ("SHELL_ELEMENT\n1,5,3.0", 3.0),
+        ("SHELL_ELEMENT_ID\n9,name\n1,5,3.0", 3.0),
+        ("SHELL_SET\n7,5,-3.0", -3.0),
+        ("SEGMENT\n5,3.0,0,1,2,3,4", 3.0),
+        ("SEGMENT\n5,3.0,0,3,2,1,4", -3.0),
+        ("SEGMENT_SET\n8,5,3.0", -3.0),
+    ] {
+        let model = whole(&of(load)).0;
+        let [surface] = &model.setup.loads.surfaces[..] else { panic!("one load: {load}") };
+        let SurfaceKind::Pressure(drive) = surface.kind else { panic!("a pressure: {load}") };
+        assert_eq!((drive.factor, surface.faces.len()), (factor, 1), "{load}");
+        assert_eq!(format!("{:?}", super::converted(&of(load), "a.k")), format!("{model:?}"), "{load}");
+    }
+    assert!(
+        faults(&of("SHELL_ELEMENT\n2,5"))[0].contains("read shell 2"),
+        "{:?}",
+        faults(&of("SHELL_ELEMENT\n2,5"))
+    );
+    assert!(faults(&of("SHELL_SET\n9,5"))[0].contains("a set of shells of the deck"));
+    assert!(faults(&of("SHELL_ELEMENT\n1,-2"))[0].contains("read -2"));
+    assert!(faults(&of("SHELL_ELEMENT\n1,5,1,1e-7"))[0].contains("an arrival time of 0"));
 }
