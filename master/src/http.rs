@@ -7,12 +7,10 @@
 use std::{
     collections::VecDeque,
     net::{IpAddr, SocketAddr},
-    pin::Pin,
     sync::{
         Arc, Mutex, PoisonError, Weak,
         atomic::{AtomicBool, Ordering},
     },
-    task::{Context, Poll},
     time::Duration,
 };
 
@@ -25,12 +23,10 @@ use axum::{
 };
 use protocol::tls::{self, ServerConfig};
 use tokio::{
-    io::{AsyncRead, AsyncWrite, ReadBuf},
-    net::{TcpListener, TcpStream},
+    net::TcpListener,
     sync::{mpsc, oneshot},
-    time::Sleep,
 };
-use tokio_rustls::{TlsAcceptor, server::TlsStream};
+use tokio_rustls::TlsAcceptor;
 use tracing::{debug, warn};
 
 pub mod api;
@@ -43,26 +39,21 @@ pub mod guard;
 pub mod metrics;
 pub mod surface;
 pub mod tar;
+mod wire;
 
 use api_state::ApiState;
 use guard::Refusal;
+use wire::{Limits, Stream, Wire};
 
 use crate::{
     notice::{self, Notice},
-    places::{self, Places},
+    places::Places,
 };
 
 /// Most connections at a time.
 pub const CONNECTIONS: usize = 256;
 /// The longest that a TLS handshake may take.
 const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
-/// The longest that a caller may take to say what it asks for.
-const HEADER_LIMIT: Duration = Duration::from_secs(5);
-/// More bytes than these are no headers any more, but a deck on its way.
-const HEADER_BYTES: usize = 16 << 10;
-/// The longest that a deck may be on its way, and that a connection may stand after something was answered; a stream of events says
-/// something every 15 s.
-const IDLE_LIMIT: Duration = Duration::from_secs(60);
 /// The longest that the owner of the queue may take to say that it is well.
 const HEALTH_LIMIT: Duration = Duration::from_secs(2);
 /// What pages may load: their own files and nothing else, the module that computes a block again among them.
@@ -110,11 +101,17 @@ impl Place {
 
 /// Serves for ever.
 pub async fn serve(place: Place, api_state: ApiState) {
+    serve_within(place, router(api_state), Limits::default()).await;
+}
+
+/// Serves this, to callers that keep within these limits.
+async fn serve_within(place: Place, router: Router, limits: Limits) {
     let Ok(address) = place.address() else { return };
     let (send, ready) = mpsc::channel(16);
-    tokio::spawn(take(place, send));
+    tokio::spawn(take(place, limits, send));
     let door = Door { ready, address };
-    if let Err(error) = axum::serve(door, router(api_state)).await {
+    let service = router.into_make_service_with_connect_info::<wire::Asker>();
+    if let Err(error) = axum::serve(door, service).await {
         warn!("the page: {error}");
     }
 }
@@ -129,6 +126,7 @@ fn router(api_state: ApiState) -> Router {
         .route(&format!("{path}jobs/{{job}}"), axum::routing::get(assets::page_of_a_job))
         .route("/metrics", axum::routing::get(metrics::text))
         .fallback(|| async { (StatusCode::NOT_FOUND, "no such page\n") })
+        .layer(middleware::from_fn(wire::note_work))
         .layer(middleware::from_fn_with_state(api_state.clone(), check_request))
         .with_state(api_state)
 }
@@ -187,7 +185,7 @@ fn with_headers(mut answer: Response) -> Response {
 }
 
 /// Takes connections; handshakes go on beside each other, so that a silent caller holds up nobody.
-async fn take(place: Place, send: mpsc::Sender<Wire>) {
+async fn take(place: Place, limits: Limits, send: mpsc::Sender<Wire>) {
     let places = Arc::new(Places::new(CONNECTIONS));
     let mut waiting = Waiting::default();
     loop {
@@ -215,9 +213,9 @@ async fn take(place: Place, send: mpsc::Sender<Wire>) {
         tokio::spawn(async move {
             let permit = match permit {
                 Some(permit) => permit,
-                None => match tokio::time::timeout(HEADER_LIMIT, places.wait(from.ip())).await {
+                None => match tokio::time::timeout(limits.header, places.wait(from.ip())).await {
                     Ok(Some(permit)) => permit,
-                    _ => return debug!("the page, {from}: no place within {HEADER_LIMIT:?}"),
+                    _ => return debug!("the page, {from}: no place within {:?}", limits.header),
                 },
             };
             let stream = match tls {
@@ -232,8 +230,7 @@ async fn take(place: Place, send: mpsc::Sender<Wire>) {
                 }
             };
             // The server is gone only when the daemon ends.
-            let deadline = Box::pin(tokio::time::sleep(HEADER_LIMIT));
-            let _ = send.send(Wire { stream, from, deadline, taken: 0, caller, ended, _place: permit }).await;
+            let _ = send.send(Wire::new(stream, from, limits, (caller, ended), permit)).await;
         });
     }
 }
@@ -243,6 +240,8 @@ struct Caller {
     address: IpAddr,
     /// It has not said what it asks for.
     silent: AtomicBool,
+    /// It has said all, and its answer has not begun.
+    waits: AtomicBool,
     /// Ends it.
     end: Mutex<Option<oneshot::Sender<()>>>,
 }
@@ -255,7 +254,12 @@ impl Waiting {
     /// With what tells it to end.
     fn add(&mut self, address: IpAddr) -> (Arc<Caller>, oneshot::Receiver<()>) {
         let (end, ended) = oneshot::channel();
-        let caller = Caller { address, silent: AtomicBool::new(true), end: Mutex::new(Some(end)) };
+        let caller = Caller {
+            address,
+            silent: AtomicBool::new(true),
+            waits: AtomicBool::new(false),
+            end: Mutex::new(Some(end)),
+        };
         let caller = Arc::new(caller);
         if self.0.len() > 2 * CONNECTIONS {
             self.0.retain(|caller| caller.strong_count() > 0);
@@ -302,87 +306,5 @@ impl axum::serve::Listener for Door {
 
     fn local_addr(&self) -> std::io::Result<SocketAddr> {
         Ok(self.address)
-    }
-}
-
-/// A connection, which gives its place back when it ends.
-struct Wire {
-    stream: Stream,
-    from: SocketAddr,
-    /// Ends it.
-    deadline: Pin<Box<Sleep>>,
-    /// Bytes read since something was answered.
-    taken: usize,
-    caller: Arc<Caller>,
-    /// Another one needs its place.
-    ended: oneshot::Receiver<()>,
-    _place: places::Place,
-}
-
-impl Wire {
-    fn grant(&mut self, time: Duration) {
-        self.deadline.as_mut().reset(tokio::time::Instant::now() + time);
-    }
-}
-
-enum Stream {
-    Plain(TcpStream),
-    Tls(Box<TlsStream<TcpStream>>),
-}
-
-impl AsyncRead for Wire {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        into: &mut ReadBuf<'_>,
-    ) -> Poll<std::io::Result<()>> {
-        if self.deadline.as_mut().poll(cx).is_ready() {
-            return Poll::Ready(Err(std::io::ErrorKind::TimedOut.into()));
-        }
-        if Pin::new(&mut self.ended).poll(cx).is_ready() {
-            return Poll::Ready(Err(std::io::ErrorKind::ConnectionAborted.into()));
-        }
-        let before = into.filled().len();
-        let read = match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_read(cx, into),
-            Stream::Tls(stream) => Pin::new(stream).poll_read(cx, into),
-        };
-        let only_headers = self.taken <= HEADER_BYTES;
-        self.taken += into.filled().len() - before;
-        if only_headers && self.taken > HEADER_BYTES {
-            self.caller.silent.store(false, Ordering::Relaxed);
-            self.grant(IDLE_LIMIT);
-        }
-        read
-    }
-}
-
-impl AsyncWrite for Wire {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<std::io::Result<usize>> {
-        self.taken = 0;
-        self.caller.silent.store(false, Ordering::Relaxed);
-        self.grant(IDLE_LIMIT);
-        match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_write(cx, bytes),
-            Stream::Tls(stream) => Pin::new(stream).poll_write(cx, bytes),
-        }
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
-        match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_flush(cx),
-            Stream::Tls(stream) => Pin::new(stream).poll_flush(cx),
-        }
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
-        match &mut self.stream {
-            Stream::Plain(stream) => Pin::new(stream).poll_shutdown(cx),
-            Stream::Tls(stream) => Pin::new(stream).poll_shutdown(cx),
-        }
     }
 }
