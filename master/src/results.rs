@@ -220,6 +220,10 @@ impl Folder {
     /// # Errors
     /// [`Error::Io`] if the folder cannot be listed or cleared.
     pub fn clear_but(&self, stays: impl Fn(&Path) -> bool) -> Result<(), Error> {
+        // First the checksums: who looks at files meanwhile does not take those that are gone for damaged.
+        if !stays(&self.file(SUMS)) {
+            sums::remove(self)?;
+        }
         for entry in fs::read_dir(&self.path).map_err(Error::io("read", &self.path))? {
             let entry = entry.map_err(Error::io("read", &self.path))?;
             if entry.file_name().to_str().is_some_and(is_written_by_a_run) && !stays(&entry.path()) {

@@ -2,11 +2,14 @@
 //!
 //! What is damaged is a warning with the file: nothing here can compute it again. A job that goes on looks at its files itself.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tracing::{info, warn};
 
-use crate::results::{Error, sums};
+use crate::results::{
+    Error, SUMS,
+    sums::{self, Checked},
+};
 
 /// Begins to look at these results folders, by job. Ends with the process.
 pub fn begin(folders: Vec<(u32, PathBuf)>) {
@@ -17,7 +20,7 @@ pub fn begin(folders: Vec<(u32, PathBuf)>) {
         system::processors::lowest_priority();
         let (mut count, mut damaged) = (0, 0);
         for (job, folder) in folders {
-            match sums::check(&folder) {
+            match of_what_stands(&folder, sums::check(&folder)) {
                 Ok(Some(checked)) => {
                     count += checked.count;
                     damaged += checked.damaged.len();
@@ -35,6 +38,40 @@ pub fn begin(folders: Vec<(u32, PathBuf)>) {
     }
 }
 
+/// What was found in a folder, unless its results were removed meanwhile: their checksums go first.
+fn of_what_stands(folder: &Path, found: Result<Option<Checked>, Error>) -> Result<Option<Checked>, Error> {
+    if folder.join(SUMS).exists() { found } else { Ok(None) }
+}
+
 fn tell(job: u32, error: &Error) {
     warn!(job, "{error}; submit the job again, or take the file from a copy");
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::results::Folder;
+
+    #[test]
+    fn what_is_missing_is_told_unless_the_results_are_being_removed() {
+        let place = tempfile::tempdir().expect("a folder");
+        let folder = Folder::create(place.path(), false).expect("empty");
+        let states: Vec<_> = (0..9).map(|index| folder.file(&format!("state-{index:06}.vtu"))).collect();
+        states.iter().for_each(|path| fs::write(path, "a state").expect("room"));
+        sums::write(&folder, &[]).expect("room");
+        fs::remove_file(&states[0]).expect("it is there");
+        let found = of_what_stands(place.path(), sums::check(place.path())).expect("readable");
+        assert_eq!(found.map(|checked| checked.damaged.len()), Some(1));
+
+        let during = sums::check(place.path());
+        // A removal that comes no further than to the first of these.
+        for path in &states[1..] {
+            fs::remove_file(path).expect("it is there");
+            fs::create_dir(path).expect("room");
+        }
+        folder.clear().expect_err("no file has these names");
+        assert!(of_what_stands(place.path(), during).expect("readable").is_none());
+    }
 }
