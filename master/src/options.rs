@@ -3,7 +3,10 @@
 use std::fmt;
 
 use deck::model::Model;
-use protocol::options::{Balance, JobOptions, Route};
+use protocol::{
+    handshake::SPEEDS,
+    options::{Balance, JobOptions, Route},
+};
 
 use crate::{
     balance::{Costs, Dealing},
@@ -152,12 +155,12 @@ pub fn bring_end_forward(model: &mut Model, asked: &JobOptions) -> Result<(), Er
 /// The relative speeds of `n` workers; those that are not given are 1.
 ///
 /// # Errors
-/// If a speed is not positive or there are more speeds than workers.
+/// If a speed is not one that a worker may have, or there are more speeds than workers.
 pub fn speeds_for(n: usize, given: &[f64]) -> Result<Vec<f64>, Error> {
     if given.len() > n {
         return Err(Error::Speeds { speeds: given.len(), workers: n });
     }
-    if let Some(bad) = given.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
+    if let Some(bad) = given.iter().find(|speed| !SPEEDS.contains(*speed)) {
         return Err(Error::Speed(*bad));
     }
     Ok((0..n).map(|i| given.get(i).copied().unwrap_or(1.0)).collect())
@@ -189,7 +192,11 @@ impl fmt::Display for Error {
                 write!(f, "--speeds names {speeds} workers, --workers {workers}")
             }
             Self::Speed(bad) => {
-                write!(f, "--speeds {bad}: a speed is a positive number, relative to the other workers")
+                let (least, most) = (SPEEDS.start(), SPEEDS.end());
+                write!(
+                    f,
+                    "--speeds {bad:?}: a speed, relative to the other workers, is from {least:e} to {most:e}"
+                )
             }
         }
     }
@@ -228,7 +235,13 @@ mod tests {
         assert_eq!(speeds_for(1, &[1.0, 1.0]), Err(Error::Speeds { speeds: 2, workers: 1 }));
         assert_eq!(
             speeds_for(1, &[-2.0]).map_err(String::from).expect_err("negative")[..13],
-            *"--speeds -2: "
+            *"--speeds -2.0"
         );
+        for bad in [f64::NAN, 0.0, 1e-300, 9e-7, 1.1e6, 1e300] {
+            let why = speeds_for(1, &[bad]).map_err(String::from).expect_err("no speed");
+            let expected =
+                format!("--speeds {bad:?}: a speed, relative to the other workers, is from 1e-6 to 1e6");
+            assert_eq!(why, expected);
+        }
     }
 }

@@ -48,8 +48,8 @@ pub const TOKEN_LIMIT: usize = 128;
 pub const PROOF_LIMIT: usize = 64;
 /// Most threads that a host may claim.
 pub const THREADS_LIMIT: u32 = 4096;
-/// The largest speed: a host a million times the reference is a slip of the keyboard.
-pub const SPEED_LIMIT: f64 = 1e6;
+/// The least and the largest speed: a host a million times the reference, or a millionth of it, is a slip of the keyboard.
+pub const SPEEDS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 /// The heartbeat intervals that a Welcome may set, milliseconds.
 pub const HEARTBEAT_MS: std::ops::RangeInclusive<u32> = 10..=60_000;
 
@@ -111,7 +111,7 @@ pub struct Hello {
     pub role: Role,
     /// The host's name: 1 to [`NAME_LIMIT`] letters, digits, `-`, `_` or `.`; behind an `@` which of its processes this is.
     pub name: String,
-    /// Speed relative to the reference host, above 0 and at most [`SPEED_LIMIT`]; 1 for a client.
+    /// Speed relative to the reference host, within [`SPEEDS`]; 1 for a client.
     pub speed: f64,
     /// Compute threads, 1 to [`THREADS_LIMIT`].
     pub threads: u32,
@@ -204,8 +204,13 @@ impl Hello {
             return Err(format!("name of {} bytes, must have at most {NAME_LIMIT}", self.name.len()));
         }
         check_name("lanes", &self.lanes, LANES_LIMIT)?;
-        if !(self.speed > 0.0 && self.speed <= SPEED_LIMIT) {
-            return Err(format!("speed {}, must be above 0 and at most {SPEED_LIMIT}", self.speed));
+        if !SPEEDS.contains(&self.speed) {
+            return Err(format!(
+                "speed {}, must be from {:e} to {:e}",
+                self.speed,
+                SPEEDS.start(),
+                SPEEDS.end()
+            ));
         }
         if !(1..=THREADS_LIMIT).contains(&self.threads) {
             return Err(format!("{} threads, must be 1 to {THREADS_LIMIT}", self.threads));

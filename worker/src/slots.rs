@@ -9,7 +9,10 @@ use std::sync::{
     atomic::{AtomicU32, Ordering},
 };
 
-use protocol::{Error, Result, handshake::Hello};
+use protocol::{
+    Error, Result,
+    handshake::{Hello, SPEEDS},
+};
 use tokio::sync::mpsc;
 
 /// The threads of one slot.
@@ -65,7 +68,7 @@ impl Slot {
     pub fn offer(&self, whole: &Hello, hello: &mut Hello) {
         hello.threads = self.threads();
         let part = f64::from(hello.threads) / f64::from(self.of_process.max(1));
-        hello.speed = whole.speed * part;
+        hello.speed = (whole.speed * part).max(*SPEEDS.start());
         hello.memory = (whole.memory as f64 * part) as u64;
     }
 }

@@ -103,8 +103,8 @@ fn another_version_is_refused_whatever_follows_it() {
 
 #[test]
 fn greetings_with_bad_values_are_refused_with_both_values() {
-    for speed in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1_000_001.0] {
-        let reason = format!("speed {speed}, must be above 0 and at most 1000000");
+    for speed in [f64::NAN, f64::INFINITY, 0.0, -1.0, 9e-7, 1_000_001.0] {
+        let reason = format!("speed {speed}, must be from 1e-6 to 1e6");
         assert_eq!(refused(|hello| hello.speed = speed), reason);
     }
     let (long, rule) = ("x".repeat(65), "must be 1 to 64 letters, digits, - _ or .");
