@@ -23,12 +23,13 @@ use crate::{
     machine,
     options::{CheckpointEvery, SessionOptions, bring_end_forward, interval_for, speeds_for},
     output::Output,
+    picture,
     processes::Processes,
     refine,
     results::{
-        self, Folder, Summary,
+        self, Folder, REPORT, SUMS, Summary, report,
         summary::{Origin, significant},
-        trace,
+        sums, trace,
     },
     shell::{print, quoted, tell},
     snapshot::{
@@ -114,6 +115,15 @@ pub fn run_with(args: &RunArgs, reading: &Options) -> Result<ExitCode, String> {
     // A run that resumes from its own folder goes on writing there.
     let own = args.resume.as_deref().zip(path.as_deref()).filter(|(from, path)| is_of_folder(from, path));
     let own = own.map(|(_, path)| path);
+    if let Some(folder) = own.filter(|_| args.resume.as_deref().is_some_and(Path::is_dir))
+        && complete(folder)?
+    {
+        return print(&format!(
+            "that run is over; what its results lacked is written\nresults in {}",
+            folder.display()
+        ))
+        .map(|()| ExitCode::SUCCESS);
+    }
     let resume = args.resume.as_deref().map(|path| resumed_from(path, own)).transpose()?.flatten();
     let in_place = own.is_some() && resume.is_some();
     // What is in there stays until nothing can keep the run from beginning.
@@ -246,6 +256,28 @@ fn resumed_from(path: &Path, own: Option<&Path>) -> Result<Option<Snapshot>, Str
             _ => Err(format!("no whole snapshot in {}; start the run anew, with --force", folder.display())),
         },
     }
+}
+
+/// Writes the report and the checksums of a run that is over but could not write them, as on a full disk; gives whether they were missing.
+fn complete(path: &Path) -> Result<bool, String> {
+    let has = |name: &str| path.join(name).exists();
+    let Ok(summary) = Summary::read(path) else { return Ok(false) };
+    if summary.digest.is_empty() || has(REPORT) && has(SUMS) {
+        return Ok(false);
+    }
+    // With a snapshot it goes on from there.
+    let (_, found) = Store::open(&path.join(store::FOLDER))?;
+    if found.snapshot.is_some() || !found.warnings.is_empty() {
+        return Ok(false);
+    }
+    let fault = |e: results::Error| e.to_string();
+    let folder = Folder::reopen(path).map_err(fault)?;
+    if !has(REPORT) {
+        let pictures = picture::of_report(path, &summary);
+        report::write(&folder, &summary, &summary.units, &pictures).map_err(fault)?;
+    }
+    sums::write(&folder, &[]).map_err(fault)?;
+    Ok(true)
 }
 
 /// Of a run that goes on in another folder than it began in: which states that will not have.

@@ -10,7 +10,7 @@ use std::{
 
 use master::{
     quality::Grade,
-    results::{REPORT, SUMMARY, Summary},
+    results::{REPORT, SUMMARY, SUMS, Summary},
 };
 
 /// A bar of copper that strikes a wall and loses the elements that it strikes with; a gauge stands there.
@@ -79,6 +79,32 @@ fn a_run_is_judged_and_says_where_it_comes_from() {
         "{:?}",
         whole.quality
     );
+}
+
+#[test]
+fn a_run_that_is_over_and_lacks_its_report_or_its_checksums_is_completed() {
+    let folder = tempfile::tempdir().expect("room");
+    run(folder.path(), BAR, &["--cycles", "20"]);
+    let results = folder.path().join("results/bar");
+    let read = |name: &str| fs::read(results.join(name)).expect("written");
+    let (report, sums) = (read(REPORT), read(SUMS));
+    for missing in [&[SUMS][..], &[REPORT, SUMS]] {
+        missing.iter().for_each(|name| fs::remove_file(results.join(name)).expect("it is there"));
+        let told = run(folder.path(), BAR, &["--cycles", "20", "--resume", "results/bar"]);
+        assert!(told.contains("that run is over; what its results lacked is written"), "{told}");
+        assert_eq!((read(REPORT) == report, read(SUMS) == sums), (true, true), "{missing:?}");
+    }
+}
+
+#[test]
+fn workers_of_the_most_unlike_speeds_compute_the_same() {
+    let folder = tempfile::tempdir().expect("room");
+    let digest = |speeds: &str| {
+        run(folder.path(), BAR, &["--cycles", "20", "--force", "--speeds", speeds]);
+        summary(&folder.path().join("results/bar")).digest
+    };
+    let one = digest("1");
+    assert_eq!([digest("1e6,1e-6"), digest("1e-6,1e6,1")], [one.clone(), one]);
 }
 
 #[test]
