@@ -87,7 +87,7 @@ fn compute_all(args: &StudyArgs) -> Result<ExitCode, String> {
     let outcomes = course.into_outcomes();
     write(&out, &study, &outcomes)?;
     print(&study, &outcomes, args.json)?;
-    let failed = outcomes.values().filter(|outcome| matches!(outcome, Outcome::Failed(_))).count();
+    let failed = outcomes.values().filter(|outcome| !outcome.is_whole()).count();
     warn_of_short_runs(&study, &outcomes);
     if !args.json {
         shell::print(&format!(
@@ -105,7 +105,7 @@ fn compute_all(args: &StudyArgs) -> Result<ExitCode, String> {
     }
     if failed > 0 {
         return Err(format!(
-            "{failed} of {} runs failed; {} has the reasons",
+            "{failed} of {} runs failed or lack a measure; {} has the reasons",
             outcomes.len(),
             out.join(page::PAGE).display()
         ));

@@ -299,10 +299,14 @@ impl<'a> Course<'a> {
                 let values = self.study.measures.iter().zip(&row.values).zip(&row.still_moving);
                 values
                     .map(|((measure, value), moving)| {
+                        let value = match value {
+                            Ok(value) => short(*value),
+                            Err(why) => format!("has no value: {why}"),
+                        };
                         let doubt = moving.as_ref().map_or_else(String::new, |gauge| {
                             format!(" (too short? {gauge} still moves forward at the end)")
                         });
-                        format!("{} {}{doubt}", measure.name, short(*value))
+                        format!("{} {value}{doubt}", measure.name)
                     })
                     .collect::<Vec<_>>()
                     .join(", ")
@@ -310,7 +314,7 @@ impl<'a> Course<'a> {
             Outcome::Failed(why) => why.clone(),
         };
         // A run whose measure has no value counts as failed, however its results came.
-        let how = if matches!(outcome, Outcome::Failed(_)) { "failed" } else { how };
+        let how = if !outcome.is_whole() { "failed" } else { how };
         tell(&format!("{at}{sample}: {told} ({how})"));
         self.outcomes.insert(point, outcome);
     }
@@ -350,7 +354,7 @@ fn check_measures(study: &Study, ready: &BTreeMap<Point, Arc<Prepared>>) -> Resu
     }
 }
 
-/// The measures of a run whose results lie in a folder. A measure without a value is a failed run.
+/// The measures of a run whose results lie in a folder. One without a value leaves the others theirs.
 fn outcome_of(study: &Study, point: &Point, facts: &Facts, entry: &Path) -> Result<Outcome, String> {
     let [history, summary] = FILES.map(|name| entry.join(name));
     let history = Table::read(&history).map_err(|e| e.to_string())?;
@@ -364,11 +368,43 @@ fn outcome_of(study: &Study, point: &Point, facts: &Facts, entry: &Path) -> Resu
         match measure.formula.of_run(&history, facts, &known) {
             Ok(value) => {
                 known.insert(measure.name.clone(), value);
-                values.push(value);
+                values.push(Ok(value));
                 still_moving.push(measure.formula.still_moving(&history, facts).map(str::to_owned));
             }
-            Err(why) => return Ok(Outcome::Failed(format!("measure {}: {why}", measure.name))),
+            Err(why) => {
+                values.push(Err(why.to_string()));
+                still_moving.push(None);
+            }
         }
     }
     Ok(Outcome::Done(Row { values, cycles: summary.cycles, digest: summary.digest, still_moving }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::{HISTORY, SUMMARY};
+
+    #[test]
+    fn a_measure_without_a_value_leaves_the_others_the_cycles_and_the_digest() {
+        let text = "title = \"s\"\ndeck = \"d.toml\"\n[[parameter]]\nname = \"v\"\nvalues = [0.7]\n[[measure]]\nname = \"a\"\n\
+            of = \"2 * kinetic\"\n[[measure]]\nname = \"b\"\nof = \"kinetic / friction\"\n[[measure]]\nname = \"c\"\nof = \"v * a\"\n";
+        let study = super::super::read::read(text, Path::new("s.toml")).expect("no fault");
+        let deck = "title = \"block\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"block\"\nmaterial = \"LEAD\"\n\
+            box = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }\n";
+        let facts = Facts::of(&deck::read(deck, "d.toml").expect("no fault"), &[]);
+        let entry = tempfile::tempdir().expect("room");
+        let mut summary = Summary { cycles: 70, digest: "ab12".to_owned(), ..Summary::default() };
+        summary.energies.kinetic = 4.0;
+        let json = serde_json::to_string(&summary).expect("numbers");
+        std::fs::write(entry.path().join(SUMMARY), json).expect("room");
+        std::fs::write(entry.path().join(HISTORY), "time [s]\n0.0\n").expect("room");
+        let point = Point { values: vec![0.7], sample: 0 };
+        let outcome = outcome_of(&study, &point, &facts, entry.path()).expect("readable");
+        let Outcome::Done(row) = &outcome else { panic!("{outcome:?}") };
+        assert!(row.values[1].as_ref().is_err_and(|why| why.contains("it comes to inf")), "{row:?}");
+        assert!(!outcome.is_whole());
+        let table = table::table(&study, &Outcomes::from([(point, outcome)]));
+        assert_eq!(table, "v,a,b,c,cycles,digest,state\n0.7,8.0,,5.6,70,ab12,incomplete\n");
+    }
 }

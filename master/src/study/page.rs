@@ -32,13 +32,13 @@ type Key = Vec<u64>;
 /// The page.
 pub fn page(study: &Study, outcomes: &Outcomes) -> String {
     let mut body = format!("<h1>{}</h1>\n", escaped(&study.title));
-    let failed = outcomes.values().filter(|outcome| matches!(outcome, Outcome::Failed(_))).count();
+    let failed = outcomes.values().filter(|outcome| !outcome.is_whole()).count();
     let _ = writeln!(
         body,
         "<p>{} runs of <code>{}</code>{}.</p>",
         outcomes.len(),
         escaped(&study.deck.display().to_string()),
-        if failed > 0 { format!(", {failed} of which failed") } else { String::new() }
+        if failed > 0 { format!(", {failed} of which failed or lack a measure") } else { String::new() }
     );
     body.push_str(&goal(study, outcomes));
     body.push_str(&scatter(study, outcomes));
@@ -139,11 +139,12 @@ fn by_others(
     let mut curves: BTreeMap<Key, BTreeMap<u64, (f64, Vec<f64>)>> = BTreeMap::new();
     for (point, outcome) in outcomes {
         let Outcome::Done(row) = outcome else { continue };
+        let Ok(value) = row.values[measure] else { continue };
         let others = point.values.iter().enumerate().filter(|(n, _)| *n != along);
         let key: Key = others.map(|(_, value)| ordered(*value)).collect();
         let at = point.values[along];
         let values = &mut curves.entry(key).or_default().entry(ordered(at)).or_insert((at, Vec::new())).1;
-        values.push(row.values[measure]);
+        values.push(value);
     }
     curves
 }
@@ -311,7 +312,13 @@ fn runs(study: &Study, outcomes: &Outcomes) -> String {
         let mut cells: Vec<String> = point.values.iter().map(|value| label(*value)).collect();
         cells.extend(study.scatter.map(|_| point.sample.to_string()));
         match outcome {
-            Outcome::Done(done) => cells.extend(done.values.iter().map(|value| label(*value))),
+            Outcome::Done(done) => {
+                let cell = |value: &Result<f64, String>| match value {
+                    Ok(value) => label(*value),
+                    Err(why) => escaped(why),
+                };
+                cells.extend(done.values.iter().map(cell));
+            }
             Outcome::Failed(why) => {
                 cells.push(format!("failed: {}", escaped(why)));
                 cells.extend(study.measures.iter().skip(1).map(|_| String::new()));

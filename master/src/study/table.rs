@@ -20,15 +20,22 @@ pub const SCATTER: &str = "scatter.csv";
 pub enum Outcome {
     /// It came to its end.
     Done(Row),
-    /// It did not, or a measure of it has no value, and why.
+    /// It did not, and why.
     Failed(String),
+}
+
+impl Outcome {
+    /// Whether the run came to its end and every measure of it has a value.
+    pub fn is_whole(&self) -> bool {
+        matches!(self, Self::Done(row) if row.values.iter().all(Result::is_ok))
+    }
 }
 
 /// The results of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// By measure.
-    pub values: Vec<f64>,
+    /// By measure, or why it has none.
+    pub values: Vec<Result<f64, String>>,
     pub cycles: u64,
     pub digest: String,
     /// By measure, the gauge that had not perforated and yet moved on at the end, if there is one ([`Formula::still_moving`]).
@@ -48,7 +55,7 @@ pub fn known<'a>(
     move |point| {
         let measure = study.goal.search().map_or(0, |search| search.measure);
         Some(match outcomes.get(point)? {
-            Outcome::Done(row) => Ok(row.values[measure]),
+            Outcome::Done(row) => row.values[measure].as_ref().copied().map_err(|_| ()),
             Outcome::Failed(_) => Err(()),
         })
     }
@@ -100,8 +107,12 @@ pub fn table(study: &Study, outcomes: &Outcomes) -> String {
         cells.extend(study.scatter.map(|_| point.sample.to_string()));
         match outcome {
             Outcome::Done(Row { values, cycles, digest, still_moving: _ }) => {
-                cells.extend(numbers(values, None));
-                cells.extend([cycles.to_string(), digest.clone(), "done".to_owned()]);
+                let cell = |value: &Result<f64, String>| {
+                    value.as_ref().map_or_else(|_| String::new(), |value| format!("{value:?}"))
+                };
+                cells.extend(values.iter().map(cell));
+                let state = if outcome.is_whole() { "done" } else { "incomplete" };
+                cells.extend([cycles.to_string(), digest.clone(), state.to_owned()]);
             }
             Outcome::Failed(_) => {
                 cells.extend(study.measures.iter().map(|_| String::new()));
@@ -262,7 +273,7 @@ pub fn intervals(study: &Study, outcomes: &Outcomes) -> Vec<(Vec<f64>, String, I
     for of_point in runs.chunk_by(|(a, _), (b, _)| a.values == b.values) {
         for (index, measure) in study.measures.iter().enumerate() {
             let value = |(point, outcome): &(&Point, &Outcome)| match outcome {
-                Outcome::Done(row) => Some((point.sample, row.values[index])),
+                Outcome::Done(row) => Some((point.sample, *row.values[index].as_ref().ok()?)),
                 Outcome::Failed(_) => None,
             };
             let all: Vec<(u32, f64)> = of_point.iter().filter_map(value).collect();
