@@ -62,7 +62,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Exists(path) => {
-                write!(f, "{} exists; choose another folder, or force to replace it", path.display())
+                write!(f, "{} exists; choose another folder, or give --force to replace it", path.display())
             }
             Self::NoAuthority(path) => write!(f, "{} is missing; make the CA first", path.display()),
             Self::Name { given, expected } => write!(f, "{given:?} must be {expected}"),
@@ -354,7 +354,8 @@ mod tests {
         let files = [folder.path().join("ca.pem"), folder.path().join("ca-key.pem"), host.key.clone()];
         let before = files.each_ref().map(|path| fs::read(path).expect("written"));
         let path = folder.path().join("ca.pem");
-        let expected = format!("{} exists; choose another folder, or force to replace it", path.display());
+        let expected =
+            format!("{} exists; choose another folder, or give --force to replace it", path.display());
         assert_eq!(make_ca(folder.path(), false).expect_err("there is one").to_string(), expected);
         let error = make_host(folder.path(), "pc", &[], Role::Worker, false).expect_err("there is one");
         assert!(matches!(error, Error::Exists(path) if path == host.ca));

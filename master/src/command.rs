@@ -64,7 +64,7 @@ pub enum Command {
     Submit(SubmitArgs),
     /// Follow a job until it ends, then print its summary
     Watch {
-        /// The job [default: the newest]
+        /// The job [default: the newest that is not over, else the newest]
         job: Option<u32>,
         /// Follow it only until it runs, or until it is done: then any other end is a failure, and so is a job that is held
         #[arg(long, value_enum, value_name = "STATE")]

@@ -321,9 +321,10 @@ impl Queue {
         self.jobs.get(&id)
     }
 
-    /// The newest job.
+    /// The newest job that is not over, else the newest.
     pub fn last(&self) -> Option<u32> {
-        self.jobs.keys().next_back().copied()
+        let goes_on = self.jobs.values().rev().find(|job| !is_over(job.state)).map(|job| job.id);
+        goes_on.or_else(|| self.jobs.keys().next_back().copied())
     }
 
     /// Changes a job's state; gives the new one, and the jobs that are forgotten.
@@ -466,6 +467,17 @@ mod tests {
         assert!(queue.remove(1).is_ok());
         let twice = Error::Illegal(State::Done, Change::Cancel).to_string();
         assert_eq!(twice, "a job that is done cannot be cancelled");
+    }
+
+    #[test]
+    fn the_newest_job_is_the_newest_that_is_not_over() {
+        let mut queue = Queue::new(1);
+        assert_eq!(queue.last(), None);
+        let ids = [(); 3].map(|()| add(&mut queue).expect("room"));
+        let mut last_without = |id| queue.apply(id, Change::Cancel).map(|_| queue.last());
+        assert_eq!(last_without(ids[2]), Ok(Some(ids[1])));
+        assert_eq!(last_without(ids[1]), Ok(Some(ids[0])));
+        assert_eq!(last_without(ids[0]), Ok(Some(ids[2])), "all are over");
     }
 
     #[test]

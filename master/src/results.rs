@@ -122,7 +122,10 @@ impl fmt::Display for Error {
                 write!(f, "cannot {action} {}: {source}", path.display())?;
                 match source.kind() {
                     io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-                        write!(f, "; free some space or name a folder on another disk with --out")
+                        write!(
+                            f,
+                            "; free some space, or name a folder on another disk (--out; of a master --spool)"
+                        )
                     }
                     _ => Ok(()),
                 }

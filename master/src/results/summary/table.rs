@@ -42,7 +42,7 @@ impl Summary {
         self.print_parts(out, units)?;
         writeln!(
             out,
-            "  momentum   {:<10} {:>14}   supports and walls included",
+            "  momentum   {:<10} {:>14}   what supports, walls, gravity and loads gave, or rounding",
             "change",
             percent(self.momentum_error)
         )?;
