@@ -221,8 +221,7 @@ fn hourglass(totals: &RunTotals, parts: &[NamedPart]) -> Vec<Measure> {
         advice,
     )];
     for part in parts.iter().filter(|part| part.hourglass > NEGLIGIBLE * totals.scale()) {
-        let gone = if part.eroded_elements > 0 { totals.eroded.max(0.0) } else { 0.0 };
-        let own = part.internal.max(0.0) + gone;
+        let own = part.internal_of_all();
         let value = if own > 0.0 { part.hourglass / own } else { f64::INFINITY };
         if value > PART_HOURGLASS[0] && value.is_finite() {
             let name = format!("hourglass energy of {}", part.name);
@@ -266,16 +265,16 @@ fn eroded(totals: &RunTotals) -> Option<Measure> {
 
 fn viscosity(totals: &RunTotals, parts: &[NamedPart]) -> Vec<Measure> {
     let tells = |part: &&NamedPart| {
-        part.viscosity > HEATED * totals.scale() && part.viscosity > VISCOSITY * part.internal.max(0.0)
+        part.viscosity > HEATED * totals.scale() && part.viscosity > VISCOSITY * part.internal_of_all()
     };
     let measure = |part: &NamedPart| {
-        let value = part.viscosity / part.internal.max(f64::MIN_POSITIVE);
+        let value = part.viscosity / part.internal_of_all().max(f64::MIN_POSITIVE);
         share(
             format!("shock viscosity of {}", part.name),
             value.min(1e3),
             [VISCOSITY, f64::INFINITY],
             "of its internal energy",
-            "waves in it are steeper than its cells can carry: compare peaks with those of a finer mesh",
+            "a strong shock that has passed leaves its heat so, at any mesh; else waves are steeper than cells can carry: peaks that stay with a finer mesh tell which",
         )
     };
     parts.iter().filter(tells).map(measure).collect()
@@ -415,6 +414,33 @@ mod tests {
     #[test]
     fn shares_are_told_in_percent_with_as_many_digits_as_matter() {
         assert_eq!([0.00012, 0.012, 0.5].map(percent), ["0.012 %", "1.2 %", "50 %"]);
+    }
+
+    #[test]
+    fn what_has_eroded_of_a_part_counts_with_its_own_internal_energy_and_with_no_other_s() {
+        let deck = "title = \"block\"\nunits = \"SI\"\n[control]\nend_time = 1.0\n[[part]]\nname = \"block\"\nmaterial = \"LEAD\"\n\
+            box = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }\n";
+        let model = deck::read(deck, "block.toml").expect("no fault");
+        let state = mechanics::initial::state(&model.mesh, &model.setup, &model.velocity, &model.constraint);
+        let mut totals = RunTotals::at_start(&model, &state.expect("volumes above 0"));
+        (totals.greatest_kinetic, totals.hourglass, totals.eroded) = (100.0, 12.0, 60.0);
+        let part = |name: &str, eroded_energy: f64| NamedPart {
+            name: name.to_owned(),
+            internal: 20.0,
+            hourglass: 6.0,
+            viscosity: 30.0,
+            eroded_elements: 1,
+            eroded_energy,
+            ..NamedPart::default()
+        };
+        let parts = [part("worn", 60.0), part("scratched", 0.0)];
+        let told = |measures: Vec<Measure>| {
+            let of_parts = measures.into_iter().filter(|measure| measure.name.contains(" of "));
+            of_parts.map(|measure| (measure.name, measure.value)).collect::<Vec<_>>()
+        };
+        let only = |name: &str, value: f64| vec![(name.to_owned(), value)];
+        assert_eq!(told(hourglass(&totals, &parts)), only("hourglass energy of scratched", 0.3));
+        assert_eq!(told(viscosity(&totals, &parts)), only("shock viscosity of scratched", 1.5));
     }
 
     #[test]

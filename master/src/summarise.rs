@@ -130,7 +130,7 @@ pub fn summarise(
         worst_penetration: run_totals.worst_penetration,
         rebalances: outcome.rebalances.clone(),
         losses: outcome.losses.clone(),
-        warnings: hourglass_warnings(&model.mesh.parts, &parts, run_totals.eroded, run_totals.scale())
+        warnings: hourglass_warnings(&model.mesh.parts, &parts, run_totals.scale())
             .into_iter()
             .chain(outcome.runaways.iter().map(ToString::to_string))
             .chain(dead.iter().map(|gauge| dead_gauge_warning(gauge, Units::named(&model.units).time)))
@@ -171,6 +171,7 @@ fn named_parts(model: &Model, run_totals: &RunTotals, state: Option<&GlobalState
     };
     let of = |(p, (part, e)): (usize, (&mechanics::mesh::Part, &PartEnergy))| NamedPart {
         eroded_elements: eroded(p),
+        eroded_energy: e.eroded,
         name: part.name.clone(),
         mass: run_totals.masses.get(p).copied().unwrap_or_default(),
         momentum: run_totals.last.part_momenta.get(p).copied().unwrap_or_default(),
@@ -218,18 +219,12 @@ fn waits_warning(waits: u64, cycles: u64) -> Option<String> {
     })
 }
 
-/// The parts whose hourglass energy is large beside their internal energy, as warnings. With the internal energy of a part that erodes
-/// goes what has `eroded` in the whole run, since some of it was its own; `scale` is the energy of the run.
-fn hourglass_warnings(
-    of_mesh: &[mechanics::mesh::Part],
-    parts: &[NamedPart],
-    eroded: f64,
-    scale: f64,
-) -> Vec<String> {
+/// The parts whose hourglass energy is large beside their internal energy, as warnings; `scale` is the energy of the
+/// run.
+fn hourglass_warnings(of_mesh: &[mechanics::mesh::Part], parts: &[NamedPart], scale: f64) -> Vec<String> {
     let mut warnings = Vec::new();
     for (in_mesh, part) in of_mesh.iter().zip(parts) {
-        let gone = if part.eroded_elements > 0 { eroded.max(0.0) } else { 0.0 };
-        let (hourglass, internal) = (part.hourglass, part.internal.max(0.0) + gone);
+        let (hourglass, internal) = (part.hourglass, part.internal_of_all());
         if hourglass <= HOURGLASS_SHARE * internal || hourglass <= NEGLIGIBLE * scale {
             continue;
         }
@@ -310,13 +305,14 @@ mod tests {
 
     #[test]
     fn a_part_whose_hourglass_energy_is_a_tenth_of_the_internal_one_is_told_where_that_matters() {
-        let parts = [
+        let mut parts = [
             part("sound", 10.0, 0.9, 0),
             part("swallowed", 10.0, 1.1, 0),
             part("hardly strained", 1e-3, 0.5, 0),
             part("cold and bent", -1e-9, 2.0, 0),
             part("worn", 1.0, 1.5, 3),
         ];
+        parts[4].eroded_energy = 20.0;
         let in_mesh = |kind: Kind| Part {
             name: String::new(),
             material: 0,
@@ -328,7 +324,7 @@ mod tests {
         let mut of_mesh = [Kind::Viscous; 5].map(in_mesh);
         of_mesh[3].hourglass.kind = Kind::AssumedStrain;
         assert_eq!(
-            hourglass_warnings(&of_mesh, &parts, 20.0, 100.0),
+            hourglass_warnings(&of_mesh, &parts, 100.0),
             [
                 "part \"swallowed\": hourglass energy 1.100e0, above a tenth of its internal energy of 1.000e1; refine its mesh \
                  where it bends or is struck, or give it hourglass = { kind = \"assumed-strain\" }",
@@ -336,7 +332,9 @@ mod tests {
                  single elements, so refine its mesh where it bends or is struck and see whether the answer stays",
             ]
         );
-        // Without erosion elsewhere its own internal energy is what counts.
-        assert_eq!(hourglass_warnings(&of_mesh[4..], &parts[4..], 0.0, 100.0).len(), 1);
+        // What has eroded of others is none of its own.
+        parts[4].eroded_energy = 0.0;
+        parts[1].eroded_energy = 20.0;
+        assert_eq!(hourglass_warnings(&of_mesh[4..], &parts[4..], 100.0).len(), 1);
     }
 }

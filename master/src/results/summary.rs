@@ -218,6 +218,16 @@ pub struct NamedPart {
     /// Elements of it that have eroded.
     #[serde(default)]
     pub eroded_elements: u64,
+    /// Energy that left it with them, and with nodes that were dropped.
+    #[serde(default)]
+    pub eroded_energy: f64,
+}
+
+impl NamedPart {
+    /// Its internal energy with what has eroded of it: what its hourglass and viscous work went into.
+    pub fn internal_of_all(&self) -> f64 {
+        self.internal.max(0.0) + self.eroded_energy.max(0.0)
+    }
 }
 
 /// A gauge that has lost its last element: rows after this one are no signal of the body.
