@@ -83,3 +83,82 @@ fn bodies_one_gap_apart_begin_when_a_study_has_shaken_their_nodes() {
         assert!(energies.is_some_and(|share| share < 1e-6), "{energies:?}");
     }
 }
+
+/// A rigid block that rests one gap above a rigid plate, and a soft spring that pulls it: what alone deforms would bear a step far longer than
+/// their contact does.
+#[test]
+fn rigid_bodies_that_begin_in_contact_stay_where_all_else_is_soft() {
+    let solved = run(model(
+        r#"
+        title = "block on a plate"
+        units = "mm-ms-kg"
+        [control]
+        end_time = 3
+        [[material]]
+        name = "any"
+        density = 7.85e-6
+        eos = { type = "linear", bulk = 0.1 }
+        strength = { type = "elastic", shear = 0.05 }
+        [[part]]
+        name = "block"
+        material = "any"
+        box = { origin = [0, 0, 0.5], size = [10, 10, 5], cells = [2, 2, 1] }
+        [[part]]
+        name = "plate"
+        material = "any"
+        box = { origin = [-10, -10, -5], size = [30, 30, 5], cells = [3, 3, 1] }
+        [[part]]
+        name = "spring"
+        spring = { stiffness = 2e-5 }
+        mesh = { nodes = [[900001, 10, 5, 5.5], [900002, 30, 5, 5.5]], elements = [[1, 900001, 900002]] }
+        [[join]]
+        parts = ["block", "spring"]
+        [[mass]]
+        nodes = [900002]
+        mass = 0.001
+        [[boundary]]
+        type = "velocity"
+        nodes = [900002]
+        velocity = { x = 0.5, y = 0, z = 0 }
+        [[rigid]]
+        parts = ["block"]
+        [[rigid]]
+        parts = ["plate"]
+        velocity = { x = 0, y = 0, z = 0 }
+        spin = { x = 0, y = 0, z = 0 }
+        [contact]
+        friction = 0.4
+        gap_length = 0.5
+        [gravity]
+        acceleration = [0, 0, -0.01]
+        "#,
+    ));
+    let last = &solved.outcome.run_totals.last;
+    // Its weight is 3.9e-5 kN, and the spring pulls it with up to 3e-5 kN, which friction does not hold.
+    let fastest = solved.part_velocity(0).map(f64::abs).into_iter().fold(0.0, f64::max);
+    assert!(fastest < 0.05 && last.error.abs() < 0.01, "{fastest} {last:?}");
+}
+
+/// Blocks of equal outline, glued and pressed on each other until the glue lets go: its nodes on the rim lie on two faces of the other block.
+#[test]
+fn a_tie_that_lets_go_on_the_rim_of_a_body_gives_no_energy() {
+    for (cells, friction) in [("[6, 6, 2]", 0.0), ("[6, 6, 2]", 0.3), ("[4, 4, 2]", 0.0)] {
+        let part = |name: &str, z: u32, cells: &str, speed: i32| {
+            format!(
+                "[[part]]\nname = \"{name}\"\nvelocity = [0, 0, {speed}]\n\
+                 material = {{ density = 2.7e-6, eos = {{ type = \"linear\", bulk = 68.6 }}, strength = {{ type = \"elastic\", shear = 26.3 }} }}\n\
+                 box = {{ origin = [0, 0, {z}], size = [10, 10, 4], cells = {cells} }}\n"
+            )
+        };
+        let solved = run(model(&format!(
+            "title = \"glued\"\nunits = \"mm-ms-kg\"\n[control]\nend_time = 0.01\n{}{}\
+             [[boundary]]\ntype = \"fixed\"\nparts = [\"low\"]\nface = \"k-min\"\naxes = \"z\"\n\
+             [contact]\nfriction = {friction}\n\
+             [[contact.tie]]\nnodes = \"low\"\nfaces = \"high\"\ntensile_strength = 5e-4\nshear_strength = 5e-4\n",
+            part("low", 0, cells, 0),
+            part("high", 4, "[4, 4, 2]", -50)
+        )));
+        let totals = &solved.outcome.run_totals;
+        assert!(totals.last.error.abs() < 5e-3, "{cells} {friction}: {:?}", totals.last);
+    }
+}
