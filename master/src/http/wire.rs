@@ -194,7 +194,7 @@ mod tests {
     use super::*;
     use crate::http::{Place, serve_within};
 
-    const LIMITS: Limits = Limits { header: Duration::from_millis(200), idle: Duration::from_millis(500) };
+    const LIMITS: Limits = Limits { header: Duration::from_millis(600), idle: Duration::from_millis(1200) };
 
     /// Serves one path, whose answer takes longer than any limit, and connects to it.
     async fn connect() -> TcpStream {

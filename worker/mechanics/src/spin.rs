@@ -43,9 +43,9 @@ impl Turning {
     }
 }
 
-/// Advances the rotation rates of the nodes of a block and clears the moments; gives the kinetic energy of rotation
-/// `sum 1/2 I w_{n-1/2} . w_{n+1/2}` of the booked nodes, and the work that relaxation and what prescribes their rates do on them. What
-/// clamps a node that does not turn does none. The result does not depend on `width`.
+/// Advances the rotation rates of the nodes of a block and clears the moments; gives the kinetic energy of rotation of the booked nodes
+/// at `t_n`, as [`crate::work`] has it, and the work that relaxation and what prescribes their rates do on them. What clamps a node that does not
+/// turn does none. The result does not depend on `width`.
 ///
 /// # Panics
 /// If an array is shorter than the sets or the machine lacks the width.
