@@ -97,7 +97,7 @@ fn a_pressure_on_shells_gives_its_impulse_against_their_upper_side() {
     let given = |text: &str| run(model(text)).outcome.run_totals.last.momentum;
     let sides = ["[0.04, 0, 0]", "[0, 0.04, 0]"];
     for (i, j, up) in [(0, 1, 1.0), (1, 0, -1.0)] {
-        for pressure in [1e6, -1e6] {
+        for pressure in [1e6_f64, -1e6] {
             let text = format!(
                 "title = \"plate\"\nunits = \"SI\"\n[control]\nend_time = 1.5e-5\n[[part]]\nname = \"plate\"\nshell = {{ thickness = 4e-3 }}\n\
                  material = {{ density = 8000, eos = {{ type = \"linear\", bulk = 150e9 }}, strength = {{ type = \"elastic\", shear = 80e9 }} }}\n\
@@ -178,7 +178,8 @@ fn a_charge_gives_the_reflected_impulse_of_its_distance() {
         let arrived = solved.rows.iter().find(|row| row.momentum[2] > 0.0).expect("it arrives").time;
         let step = longest_step(&solved);
         assert!((arrived - 1e-3 * wave.arrival).abs() < 2.0 * step, "{arrived} {wave:?}");
-        assert!((last.external / last.kinetic - 1.0).abs() < 1e-6, "{last:?}");
+        // Work is booked in quanta: over the pulse their rounding comes to 2e-7 to 2e-6 of so little energy, by the charge.
+        assert!((last.external / last.kinetic - 1.0).abs() < 3e-6, "{last:?}");
     }
     let whole = run(blasted("air", "")).outcome.run_totals.last.momentum[2];
     let positive = run(blasted("air", "negative_phase = false\n")).outcome.run_totals.last.momentum[2];

@@ -51,7 +51,7 @@ pub struct Body {
     /// Least Courant limit of its elements at rest (time) and the global index of the element that has it: of a body of a
     /// problem in which nothing deforms; else none.
     pub courant: Option<(f64, u32)>,
-    /// Nodal forces: index into `places` and into [`Loads::forces`].
+    /// Nodal forces: index into `places` and into [`crate::load::Loads::forces`].
     pub forces: Vec<(u32, u32)>,
     /// Forces by mass, each of all the nodes that feel it.
     pub pulls: Vec<Pull>,
@@ -60,7 +60,7 @@ pub struct Body {
 /// A force by mass on some of the nodes of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pull {
-    /// Index into [`Loads::forces`].
+    /// Index into [`crate::load::Loads::forces`].
     pub load: u32,
     /// Mass that feels it.
     pub mass: f64,
