@@ -156,11 +156,12 @@ fn a_body_of_nodes_that_spins_on_a_soft_spring_is_followed_as_it_turns() {
     assert!(last.error.abs() < 1e-2, "{last:?}");
 }
 
-/// 1 kg of TNT, 0.6 m below a cube whose lower face feels it.
+/// 1 kg of TNT, 0.6 m below a cube whose lower face feels it: heavy enough to stay there, and light enough that the rounding of work in each
+/// cycle is small beside what it gets.
 fn blasted(burst: &str, more: &str) -> Model {
     let rest = format!(
         "[[load]]\ntype = \"blast\"\nface = \"k-min\"\nmass = 1\npoint = [0.005, 0.005, -0.6]\nburst = \"{burst}\"\n\
-         {more}[[rigid]]\nparts = [\"cube\"]\n[[mass]]\nmass = 1\n"
+         {more}[[rigid]]\nparts = [\"cube\"]\n[[mass]]\nmass = 0.1\n"
     );
     cube(3e-3, &rest)
 }
@@ -178,8 +179,7 @@ fn a_charge_gives_the_reflected_impulse_of_its_distance() {
         let arrived = solved.rows.iter().find(|row| row.momentum[2] > 0.0).expect("it arrives").time;
         let step = longest_step(&solved);
         assert!((arrived - 1e-3 * wave.arrival).abs() < 2.0 * step, "{arrived} {wave:?}");
-        // Work is booked in quanta: over the pulse their rounding comes to 2e-7 to 2e-6 of so little energy, by the charge.
-        assert!((last.external / last.kinetic - 1.0).abs() < 3e-6, "{last:?}");
+        assert!((last.external / last.kinetic - 1.0).abs() < 1e-6, "{last:?}");
     }
     let whole = run(blasted("air", "")).outcome.run_totals.last.momentum[2];
     let positive = run(blasted("air", "negative_phase = false\n")).outcome.run_totals.last.momentum[2];
